@@ -1,0 +1,218 @@
+//! The actuation gains from ring-downs (Equation 11).
+//!
+//! With the pattern held at an angle the energy loop is on, then off. Off, the amplitude decays at the damping of that
+//! direction; on, the command replaces just that loss. The two together give the drive's gain in that direction.
+
+use cvg_model::effects::Moment;
+use nalgebra::{Matrix2, Vector2};
+
+use crate::error::Refusal;
+use crate::hypothesis::Hypothesis;
+use crate::recording::{Run, RunKind};
+use crate::statistics::{line, robust_deviation};
+use crate::track::wrapped;
+
+/// **Equation 11**, the ratio of the actuation gains from time constants and energy control outputs:
+///
+/// $$\frac{G_{Ax}}{G_{Ay}} = \frac{\tau_{90}\,v_{as@90}}{\tau_0\,v_{as@0}}$$
+///
+/// `tau_*` in s, `v_as_*` in V, both outputs at the same true amplitude (or each divided by its own). Invariant to the
+/// amplitude set point and to a common scale of both gains. Domain: `tau_0`, `v_as_0` ≠ 0. Source: the paper,
+/// Equation 11.
+#[inline]
+pub fn actuation_gain_ratio(tau_0: f64, v_as_0: f64, tau_90: f64, v_as_90: f64) -> f64 {
+    (tau_90 * v_as_90) / (tau_0 * v_as_0)
+}
+
+/// What one ring-down tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RingDown {
+    /// name of the run
+    pub name: String,
+    /// direction of the pattern, rad
+    pub angle_rad: f64,
+    /// decay time constant of the amplitude, s
+    pub tau_s: f64,
+    /// its standard error, s
+    pub tau_error_s: f64,
+    /// energy control output per unit of true amplitude, corrected for the amplitude's own trend, 1/1
+    pub drive: f64,
+    /// its standard error
+    pub drive_error: f64,
+    /// amplitude over time, for the report
+    pub decay: Vec<(f64, f64)>,
+}
+
+/// A pattern held further than this from the campaign's angle is another run's.
+const LARGEST_ANGLE_ERROR_RAD: f64 = 0.35;
+/// The last share of the time with the energy loop on is taken as steady.
+const STEADY_SHARE: f64 = 0.6;
+/// Fewest samples in either phase.
+const FEWEST: usize = 20;
+/// Points of the decay that are kept for the report.
+const KEPT_POINTS: usize = 400;
+
+/// Evaluates a ring-down after undoing the readout effects of `hypothesis`.
+///
+/// # Errors
+/// Where the pattern turns, lies at another angle, does not decay, or too little was recorded.
+pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal> {
+    let name = crate::track::run_name(run);
+    let RunKind::Ringdown { angle_deg, energy_off_s } = run.kind else {
+        return Err(Refusal::new(&name, "is not a ring-down", "kind = \"ringdown\""));
+    };
+    let refuse = |problem: String, wanted: &str| Err(Refusal::new(&name, problem, wanted));
+    let settled = run.settled()?;
+    let r = &run.recording;
+    let (Some(x), Some(y), Some(v_as)) = (&r.xc_v, &r.yc_v, &r.vas_v) else {
+        return refuse("columns xc_v, yc_v and vas_v are needed".into(), "all three");
+    };
+    let quadrature = r.xs_v.as_ref().zip(r.ys_v.as_ref());
+    let angle_rad = angle_deg.to_radians();
+    let sample = |i: usize| {
+        let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
+        let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
+        hypothesis.unread(seen, &Moment { t_s: r.t_s[i], table_rad: 0.0, precession_rad_s: 0.0 })
+    };
+    let mut off_angle = Vec::new();
+    let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+    let first = r.t_s[settled.start];
+    let steady = energy_off_s - STEADY_SHARE * (energy_off_s - first);
+    let mut decay = Vec::new();
+    let stride = (settled.len() / KEPT_POINTS).max(1);
+    for i in settled.clone() {
+        let z = sample(i);
+        let p = z.pendulum();
+        off_angle.push(wrapped(p.angle() - angle_rad, std::f64::consts::PI));
+        let ln_a = 0.5 * p.e.ln();
+        if !ln_a.is_finite() {
+            continue;
+        }
+        if (i - settled.start).is_multiple_of(stride) {
+            decay.push((r.t_s[i], ln_a.exp()));
+        }
+        if r.t_s[i] >= steady && r.t_s[i] < energy_off_s && v_as[i].is_finite() {
+            on.0.push(r.t_s[i]);
+            on.1.push(ln_a);
+            on.2.push(v_as[i] / ln_a.exp());
+        } else if r.t_s[i] > energy_off_s {
+            off.0.push(r.t_s[i]);
+            off.1.push(ln_a);
+        }
+    }
+    let mut sorted = off_angle.clone();
+    let middle = crate::statistics::median(&mut sorted);
+    let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
+    if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
+        return refuse(
+            format!(
+                "the pattern lies at {:.1}° (± {:.1}°), not at angle_deg = {angle_deg}: a rotation run, or files swapped?",
+                (angle_rad + middle).to_degrees(),
+                spread.to_degrees()
+            ),
+            "a recording with the pattern held at angle_deg",
+        );
+    }
+    if on.0.len() < FEWEST || off.0.len() < FEWEST {
+        return refuse(
+            format!("{} steady samples with the energy loop on and {} with it off", on.0.len(), off.0.len()),
+            "at least 20 of each around energy_off_s",
+        );
+    }
+    let (rate, rate_error) = decay_rate(&off.0, &off.1);
+    if rate <= 3.0 * rate_error {
+        return refuse(
+            format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
+            "a ring-down with the energy loop off",
+        );
+    }
+    // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
+    let (trend, _) = line(&on.0, &on.1);
+    let n = on.2.len() as f64;
+    let mean = on.2.iter().sum::<f64>() / n;
+    let drive = mean * rate / (rate + trend);
+    Ok(RingDown {
+        name,
+        angle_rad: angle_rad + middle,
+        tau_s: 1.0 / rate,
+        tau_error_s: rate_error / (rate * rate),
+        drive,
+        drive_error: mean_error(&on.2, mean),
+        decay,
+    })
+}
+
+/// Decay rate of an amplitude from its logarithm, 1/s, with its standard error: weighted by the squared amplitude, since
+/// the readout's noise is constant.
+fn decay_rate(t: &[f64], ln_a: &[f64]) -> (f64, f64) {
+    let weight: Vec<f64> = ln_a.iter().map(|l| (2.0 * (l - ln_a[0])).exp()).collect();
+    let sum: f64 = weight.iter().sum();
+    let mean = |v: &[f64]| v.iter().zip(&weight).map(|(v, w)| v * w).sum::<f64>() / sum;
+    let (mt, ml) = (mean(t), mean(ln_a));
+    let (mut stt, mut stl) = (0.0, 0.0);
+    for ((t, l), w) in t.iter().zip(ln_a).zip(&weight) {
+        stt += w * (t - mt) * (t - mt);
+        stl += w * (t - mt) * (l - ml);
+    }
+    let slope = stl / stt;
+    let rest: f64 =
+        t.iter().zip(ln_a).zip(&weight).map(|((t, l), w)| w * (l - ml - slope * (t - mt)).powi(2)).sum::<f64>();
+    (-slope, (rest / (t.len() as f64 - 2.0) / stt).sqrt())
+}
+
+/// Standard error of a mean from means of blocks: neighbouring samples of a loop's output are not independent.
+fn mean_error(values: &[f64], mean: f64) -> f64 {
+    const BLOCKS: usize = 12;
+    let size = (values.len() / BLOCKS).max(1);
+    let blocks: Vec<f64> = values.chunks_exact(size).map(|b| b.iter().sum::<f64>() / b.len() as f64).collect();
+    let n = blocks.len() as f64;
+    (blocks.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt()
+}
+
+/// The two actuation gains (per 2ω, 1/s and V per V) and their covariance, from ring-downs at two or more directions:
+/// the drive's gain in direction θ is G_Ax cos²θ + G_Ay sin²θ = 1/(τ·(−v_as/a)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveGains {
+    /// G_Ax/2ω and G_Ay/2ω
+    pub gains: [f64; 2],
+    /// standard error of ln(G_Ax/G_Ay)
+    pub ratio_error: f64,
+    /// standard error of ln of the mean
+    pub mean_error: f64,
+}
+
+impl DriveGains {
+    /// From ring-downs; `None` where their directions do not tell the axes apart.
+    pub fn from_ring_downs(ring_downs: &[RingDown]) -> Option<Self> {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for r in ring_downs {
+            let gain = -1.0 / (r.tau_s * r.drive);
+            let relative = (r.tau_error_s / r.tau_s).hypot(r.drive_error / r.drive).max(1e-9);
+            let c2 = r.angle_rad.cos().powi(2);
+            let row = Vector2::new(c2, 1.0 - c2);
+            let weight = 1.0 / (relative * gain).powi(2);
+            normal += row * row.transpose() * weight;
+            right += row * gain * weight;
+        }
+        let covariance = normal.try_inverse()?;
+        let g = covariance * right;
+        let (dx, dy) = (covariance[(0, 0)].sqrt() / g[0], covariance[(1, 1)].sqrt() / g[1]);
+        let cross = covariance[(0, 1)] / (g[0] * g[1]);
+        let sound = g[0] > 0.0 && g[1] > 0.0 && dx < 0.3 && dy < 0.3;
+        sound.then(|| Self {
+            gains: [g[0], g[1]],
+            ratio_error: (dx * dx + dy * dy - 2.0 * cross).max(0.0).sqrt(),
+            mean_error: 0.5 * (dx * dx + dy * dy + 2.0 * cross).max(0.0).sqrt(),
+        })
+    }
+
+    /// G_Ax/G_Ay
+    pub fn ratio(&self) -> f64 {
+        self.gains[0] / self.gains[1]
+    }
+
+    /// √(G_Ax G_Ay)/2ω
+    pub fn mean(&self) -> f64 {
+        (self.gains[0] * self.gains[1]).sqrt()
+    }
+}

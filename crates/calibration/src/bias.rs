@@ -1,0 +1,21 @@
+//! The angle-dependent bias (Equation 1): what is left of the angle when the best line is taken out.
+
+use crate::statistics::line;
+
+/// **Equation 1**, the pattern angle of a whole-angle gyroscope, rad:
+///
+/// $$\theta(t) = -k_e \int \Omega\,dt + \theta_b$$
+///
+/// `angular_gain` = k_e; `input_rad` = ∫Ω dt, rad; `bias_rad` = θ_b, rad. Source: the paper, Equation 1.
+#[inline]
+pub fn pattern_angle(angular_gain: f64, input_rad: f64, bias_rad: f64) -> f64 {
+    -angular_gain * input_rad + bias_rad
+}
+
+/// Removes the best line in the input angle: angular gain and bias refitted on the same samples.
+///
+/// `input_rad` and `angle_rad` in rad, of one length; what is left is the angle-dependent bias, rad.
+pub fn angle_dependent_bias(input_rad: &[f64], angle_rad: &[f64]) -> Vec<f64> {
+    let (slope, intercept) = line(input_rad, angle_rad);
+    input_rad.iter().zip(angle_rad).map(|(a, r)| r - slope * a - intercept).collect()
+}

@@ -1,0 +1,161 @@
+//! `calibration.toml`: what was identified, in the form in which it is put to use. Versioned, and closed with a checksum
+//! over every byte before it: a damaged or edited file is refused.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cvg_model::effects::EffectId;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Refusal;
+use crate::hypothesis::{Hypothesis, Member, Origin};
+use crate::recording::Instrument;
+
+/// Identifier of the format.
+pub const SCHEMA: &str = "cvg.calibration/1";
+/// What the last line starts with.
+const CHECKSUM: &str = "checksum = \"crc32:";
+
+/// An identified instrument, ready to be compensated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// name of the instrument
+    pub device: String,
+    /// what is known of it
+    pub hypothesis: Hypothesis,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    schema: String,
+    device: String,
+    instrument: String,
+    period_deg: f64,
+    angular_gain: f64,
+    follows_input: bool,
+    force_scale_per_v_s: f64,
+    control_latency_s: f64,
+    #[serde(default)]
+    effect: Vec<EffectEntry>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EffectEntry {
+    id: String,
+    origin: Origin,
+    parameters: std::collections::BTreeMap<String, f64>,
+}
+
+impl Calibration {
+    /// The file's text.
+    pub fn to_text(&self) -> String {
+        let h = &self.hypothesis;
+        let file = File {
+            schema: SCHEMA.into(),
+            device: self.device.clone(),
+            instrument: match h.instrument {
+                Instrument::Gyroscope => "gyroscope".into(),
+                Instrument::Sensor => "sensor".into(),
+            },
+            period_deg: h.period_rad.to_degrees().round(),
+            angular_gain: h.angular_gain,
+            follows_input: h.follows_input,
+            force_scale_per_v_s: h.force_scale,
+            control_latency_s: h.control_latency_s,
+            effect: h
+                .members
+                .iter()
+                .map(|m| EffectEntry {
+                    id: m.id.to_string(),
+                    origin: m.origin,
+                    parameters: m
+                        .id
+                        .description()
+                        .parameters
+                        .iter()
+                        .zip(m.values)
+                        .map(|(p, v)| (p.name.to_string(), v))
+                        .collect(),
+                })
+                .collect(),
+        };
+        let mut text = String::from("# Identified by cvg. Edited by hand, it is refused.\n");
+        // every field is a plain value: serialisation has nothing to fail on
+        text.push_str(&toml::to_string(&file).unwrap_or_default());
+        let sum = crc32fast::hash(text.as_bytes());
+        let _ = writeln!(text, "\n# {CHECKSUM}{sum:08x}\"");
+        text
+    }
+
+    /// Reads a calibration from its text; `name` is the file's, for messages.
+    ///
+    /// # Errors
+    /// Where the checksum, the version, an effect or a parameter is not right.
+    pub fn from_text(text: &str, name: &str) -> Result<Self, Refusal> {
+        let refuse = |problem: String, wanted: &str| Err(Refusal::new(name, problem, wanted));
+        let marker = format!("\n# {CHECKSUM}");
+        let Some((body, sum)) = text.rsplit_once(&marker) else {
+            return refuse("the closing checksum is missing".into(), "an unedited calibration.toml as cvg wrote it");
+        };
+        let stated = sum.strip_suffix("\"\n").and_then(|s| u32::from_str_radix(s, 16).ok().filter(|_| s.len() == 8));
+        let actual = crc32fast::hash(body.as_bytes());
+        if stated != Some(actual) {
+            return refuse(
+                format!("the file was changed after it was written (its checksum is {actual:08x})"),
+                "an unedited calibration.toml as cvg wrote it",
+            );
+        }
+        let schema = body.lines().find_map(|l| l.strip_prefix("schema = ")).unwrap_or_default().trim_matches('"');
+        if schema != SCHEMA {
+            return refuse(format!("its format is \"{schema}\""), &format!("\"{SCHEMA}\": identify again"));
+        }
+        let file: File = toml::from_str(body).map_err(|e| Refusal::new(name, e.to_string(), "a calibration"))?;
+        let instrument = match file.instrument.as_str() {
+            "gyroscope" => Instrument::Gyroscope,
+            "sensor" => Instrument::Sensor,
+            other => return refuse(format!("unknown instrument \"{other}\""), "gyroscope or sensor"),
+        };
+        let mut hypothesis = Hypothesis::ideal(instrument, file.period_deg.to_radians(), file.angular_gain);
+        hypothesis.follows_input = file.follows_input;
+        hypothesis.force_scale = file.force_scale_per_v_s;
+        hypothesis.control_latency_s = file.control_latency_s;
+        for e in &file.effect {
+            hypothesis.members.push(member(e, name)?);
+        }
+        hypothesis.members.sort_by_key(|m| m.id);
+        Ok(Self { device: file.device, hypothesis })
+    }
+
+    /// Reads a calibration file.
+    ///
+    /// # Errors
+    /// Where the file cannot be read, or is refused.
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Refusal::new(&name, format!("cannot be read: {e}"), "a calibration.toml"))?;
+        Self::from_text(&text, &name)
+    }
+}
+
+fn member(entry: &EffectEntry, name: &str) -> Result<Member, Refusal> {
+    let id = EffectId::from_id(&entry.id)
+        .ok_or_else(|| Refusal::new(name, format!("unknown effect \"{}\"", entry.id), "an effect of the library"))?;
+    let parameters = id.description().parameters;
+    let mut values = id.neutral::<f64>();
+    for (key, value) in &entry.parameters {
+        let at = parameters.iter().position(|p| p.name == key);
+        let sound = at.is_some_and(|i| (parameters[i].lower..=parameters[i].upper).contains(value));
+        let (Some(i), true) = (at, sound) else {
+            return Err(Refusal::new(
+                name,
+                format!("{}: {key} = {value} is not a parameter within its bounds", entry.id),
+                "the library's names and bounds",
+            ));
+        };
+        values[i] = *value;
+    }
+    Ok(Member { id, values, origin: entry.origin, refined: true })
+}

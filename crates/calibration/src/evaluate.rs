@@ -1,0 +1,134 @@
+//! The error of a hypothesis on data that was not fitted: angle minus the best line, with angular gain and bias
+//! refitted on the same samples, after the hypothesis has removed what it knows.
+
+use crate::bias::angle_dependent_bias;
+use crate::fit::{Prepared, Residual, Window, residuals};
+use crate::hypothesis::Hypothesis;
+use crate::pass::Start;
+use crate::recording::Role;
+use crate::statistics::{circular_mean, line, robust_deviation, white_noise};
+use crate::track::wrapped;
+
+/// Residuals further out than this many robust deviations are spikes.
+const SPIKE: f64 = 6.0;
+
+/// Size of an angle error, deg.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct ErrorSize {
+    /// root mean square
+    pub rms_deg: f64,
+    /// largest magnitude
+    pub peak_deg: f64,
+    /// largest minus smallest, of the worst run
+    pub peak_to_peak_deg: f64,
+}
+
+/// The angle error of a hypothesis on the segments of one role.
+#[derive(Debug, Clone)]
+pub(crate) struct Evaluation {
+    /// residuals with the best line taken out of the angle, one per segment
+    pub(crate) segments: Vec<Residual>,
+    /// samples that are no spikes
+    pub(crate) kept: Vec<Vec<bool>>,
+}
+
+/// Evaluates `hypothesis` on the segments of `role`. Spikes are those of this evaluation, or of `like` where given.
+pub(crate) fn evaluate(
+    tracks: &[Prepared],
+    hypothesis: &Hypothesis,
+    starts: &[Vec<Start>],
+    role: Role,
+    window: Window,
+    like: Option<&Evaluation>,
+) -> Evaluation {
+    let mut segments: Vec<Residual> =
+        residuals(tracks, hypothesis, starts, role, window).into_iter().flatten().collect();
+    let mut kept = Vec::with_capacity(segments.len());
+    for (number, s) in segments.iter_mut().enumerate() {
+        let middle = circular_mean(s.angle.iter().copied(), hypothesis.period_rad);
+        for a in &mut s.angle {
+            *a = wrapped(*a - middle, hypothesis.period_rad);
+        }
+        if let Some(like) = like {
+            let keep = like.kept[number].clone();
+            take_line(s, &keep);
+            kept.push(keep);
+            continue;
+        }
+        let mut keep = vec![true; s.angle.len()];
+        for _ in 0..3 {
+            take_line(s, &keep);
+            let limit = SPIKE * robust_deviation(s.angle.iter().copied()) + f64::MIN_POSITIVE;
+            for (k, a) in keep.iter_mut().zip(&s.angle) {
+                *k = a.abs() <= limit;
+            }
+        }
+        take_line(s, &keep);
+        kept.push(keep);
+    }
+    Evaluation { segments, kept }
+}
+
+/// Takes the best line through the kept samples out of all of them.
+fn take_line(s: &mut Residual, keep: &[bool]) {
+    if keep.iter().all(|k| *k) {
+        s.angle = angle_dependent_bias(&s.turned, &s.angle);
+        return;
+    }
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        s.turned.iter().zip(&s.angle).zip(keep).filter(|(_, k)| **k).map(|((x, y), _)| (*x, *y)).unzip();
+    let (slope, intercept) = line(&x, &y);
+    for (a, t) in s.angle.iter_mut().zip(&s.turned) {
+        *a -= slope * t + intercept;
+    }
+}
+
+impl Evaluation {
+    /// Kept angle errors, rad, all segments.
+    pub(crate) fn errors(&self) -> impl Iterator<Item = f64> + '_ {
+        self.segments
+            .iter()
+            .zip(&self.kept)
+            .flat_map(|(s, k)| s.angle.iter().zip(k).filter(|(_, k)| **k).map(|(a, _)| *a))
+    }
+
+    /// Samples set aside as spikes.
+    pub(crate) fn spikes(&self) -> usize {
+        self.kept.iter().flatten().filter(|k| !**k).count()
+    }
+
+    /// Mean square of the kept errors, rad².
+    pub(crate) fn mean_square(&self) -> f64 {
+        let (n, sum) = self.errors().fold((0usize, 0.0), |(n, s), a| (n + 1, s + a * a));
+        sum / n.max(1) as f64
+    }
+
+    /// Size of the error.
+    pub(crate) fn size(&self) -> ErrorSize {
+        let peak = self.errors().fold(0.0f64, |m, a| m.max(a.abs()));
+        let spans = self.segments.iter().zip(&self.kept).map(|(s, k)| {
+            let (lo, hi) = s
+                .angle
+                .iter()
+                .zip(k)
+                .filter(|(_, k)| **k)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, _)| (l.min(*a), h.max(*a)));
+            if hi > lo { hi - lo } else { 0.0 }
+        });
+        ErrorSize {
+            rms_deg: self.mean_square().sqrt().to_degrees(),
+            peak_deg: peak.to_degrees(),
+            peak_to_peak_deg: spans.fold(0.0, f64::max).to_degrees(),
+        }
+    }
+
+    /// The white part of the error, rms over all segments, rad: no correction that varies smoothly can go below it. Asks
+    /// for an evaluation of every sample.
+    pub(crate) fn noise_floor(&self) -> f64 {
+        let (n, sum) = self
+            .segments
+            .iter()
+            .fold((0usize, 0.0), |(n, sum), s| (n + s.samples, sum + s.samples as f64 * white_noise(&s.angle).powi(2)));
+        (sum / n.max(1) as f64).sqrt()
+    }
+}

@@ -1,0 +1,562 @@
+//! The joint fit of a hypothesis to all runs: Gauss–Newton on robustly weighted residuals, one bias per segment.
+//!
+//! Residuals are those of [`crate::pass`]; the biases are eliminated in closed form, so that the system to solve has
+//! only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
+//! much narrower than its prior an unknown became is how much the data told of it.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::hypothesis::{Hypothesis, Unknown, Unknowns, direction};
+use crate::pass::{Start, walk};
+use crate::recording::Role;
+use crate::track::{Segment, Track};
+
+/// A Gaussian belief about an unknown before the data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Prior {
+    /// the unknown
+    pub(crate) unknown: Unknown,
+    /// centre
+    pub(crate) mean: f64,
+    /// standard deviation
+    pub(crate) deviation: f64,
+    /// hold the unknown where it is, and let its uncertainty show in all that depends on it (a consider parameter)
+    pub(crate) considered: bool,
+}
+
+/// Standard deviations of the residuals of one track: the scale of its weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Noise {
+    /// angle, rad
+    pub(crate) angle: f64,
+    /// ln amplitude; infinite where the amplitude is not used
+    pub(crate) amplitude: f64,
+}
+
+/// One track with what a fit needs besides: its noise and where its segments start.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    pub(crate) track: Track,
+    /// scale of the residuals, the weights of the fit
+    pub(crate) noise: Noise,
+    /// the part of them that is white
+    pub(crate) white: Noise,
+    pub(crate) starts: Vec<Start>,
+    /// residuals beyond this many rad (angle) or relative (amplitude) are set aside
+    pub(crate) limit: Noise,
+}
+
+/// The result of a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Fit {
+    pub(crate) hypothesis: Hypothesis,
+    pub(crate) unknowns: Vec<Unknown>,
+    /// covariance of the unknowns if the residuals are white
+    pub(crate) covariance: DMatrix<f64>,
+    /// starts of the segments, per track
+    pub(crate) starts: Vec<Vec<Start>>,
+    /// Σ(r/σ)² over angle residuals, and over amplitude residuals, before the last step
+    pub(crate) chi2: [f64; 2],
+    /// Σ of squared distances from the priors
+    pub(crate) prior_chi2: f64,
+    /// what the last step takes off their sum, to first order
+    pub(crate) step_gain: f64,
+    /// residuals counted in each
+    pub(crate) counted: [usize; 2],
+    /// samples set aside as spikes
+    pub(crate) set_aside: usize,
+}
+
+/// Weighted sums of one segment: Σ w v vᵀ with v = (1, slopes …, residual), for angle and amplitude apart.
+struct Sums {
+    n: usize,
+    angle: Vec<f64>,
+    amplitude: Vec<f64>,
+    counted: [usize; 2],
+    set_aside: usize,
+}
+
+impl Sums {
+    fn new(n: usize) -> Self {
+        let size = (n + 2) * (n + 3) / 2;
+        Self { n, angle: vec![0.0; size], amplitude: vec![0.0; size], counted: [0; 2], set_aside: 0 }
+    }
+
+    fn add(packed: &mut [f64], weight: f64, slopes: &[f64], residual: f64) {
+        // rows of the lower triangle: 1; slopes; residual
+        packed[0] += weight;
+        let mut at = 1;
+        for (i, s) in slopes.iter().enumerate() {
+            let ws = weight * s;
+            packed[at] += ws;
+            for (p, q) in packed[at + 1..=at + 1 + i].iter_mut().zip(slopes) {
+                *p += ws * q;
+            }
+            at += i + 2;
+        }
+        let wr = weight * residual;
+        packed[at] += wr;
+        for (p, q) in packed[at + 1..].iter_mut().zip(slopes) {
+            *p += wr * q;
+        }
+        packed[at + 1 + slopes.len()] += wr * residual;
+    }
+
+    /// Element (i, j), i ≥ j, of the packed lower triangle.
+    fn element(packed: &[f64], i: usize, j: usize) -> f64 {
+        packed[i * (i + 1) / 2 + j]
+    }
+
+    /// Adds this segment's part, its bias eliminated, to the normal matrix, the right side and Σr².
+    fn eliminate(&self, packed: &[f64], normal: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
+        let n = self.n;
+        let one = packed[0];
+        if one <= 0.0 {
+            return 0.0;
+        }
+        let of = |i: usize, j: usize| Self::element(packed, i.max(j), i.min(j));
+        for i in 0..n {
+            for j in 0..=i {
+                let v = of(i + 1, j + 1) - of(i + 1, 0) * of(j + 1, 0) / one;
+                normal[(i, j)] += v;
+                if i != j {
+                    normal[(j, i)] += v;
+                }
+            }
+            right[i] += of(n + 1, i + 1) - of(n + 1, 0) * of(i + 1, 0) / one;
+        }
+        of(n + 1, n + 1) - of(n + 1, 0) * of(n + 1, 0) / one
+    }
+
+    /// Weighted mean residual after a step of the unknowns.
+    fn start_shift(&self, packed: &[f64], step: &DVector<f64>) -> f64 {
+        if packed[0] <= 0.0 {
+            return 0.0;
+        }
+        let n = self.n;
+        let slopes: f64 = (0..n).map(|i| Self::element(packed, i + 1, 0) * step[i]).sum();
+        (Self::element(packed, n + 1, 0) - slopes) / packed[0]
+    }
+}
+
+/// How a fit is run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// most Gauss–Newton steps
+    pub(crate) steps: usize,
+    /// samples to which a track is thinned while converging
+    pub(crate) thinned: usize,
+    /// a last step on all samples
+    pub(crate) polish: bool,
+}
+
+impl Effort {
+    pub(crate) const FULL: Self = Self { steps: 14, thinned: 6_000, polish: true };
+    pub(crate) const ROUGH: Self = Self { polish: false, ..Self::FULL };
+}
+
+/// More than this share of the samples cannot be spikes.
+const LARGEST_SET_ASIDE: f64 = 0.2;
+/// A step is the last when no unknown moves by more than this share of its standard deviation.
+const CONVERGED: f64 = 0.02;
+
+/// Fits `hypothesis` to the segments of `role` of all tracks.
+pub(crate) fn fit(
+    tracks: &[Prepared],
+    hypothesis: &Hypothesis,
+    unknowns: &[Unknown],
+    priors: &[Prior],
+    role: Role,
+    effort: Effort,
+) -> Fit {
+    let sorted = Unknowns::new(hypothesis, unknowns.to_vec());
+    let n = unknowns.len();
+    let mut result = Fit {
+        hypothesis: hypothesis.clone(),
+        unknowns: unknowns.to_vec(),
+        covariance: DMatrix::zeros(n, n),
+        starts: tracks.iter().map(|t| t.starts.clone()).collect(),
+        chi2: [0.0; 2],
+        prior_chi2: 0.0,
+        step_gain: 0.0,
+        counted: [0; 2],
+        set_aside: 0,
+    };
+    let considered: Vec<Option<f64>> =
+        unknowns.iter().map(|u| priors.iter().find(|p| p.considered && p.unknown == *u).map(|p| p.deviation)).collect();
+    let (mut widened, mut damping, mut polishing) = (1.0, 0.0, false);
+    let mut best: Option<Linearised> = None;
+    for step_number in 0..effort.steps {
+        let stride = |p: &Prepared| {
+            if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, role, effort) }
+        };
+        let sums: Vec<Vec<Sums>> = tracks
+            .par_iter()
+            .zip(&result.starts)
+            .map(|(p, starts)| collect(p, starts, &result.hypothesis, &sorted, role, (stride(p), widened)))
+            .collect();
+        let here = Linearised::new(&result, sums, priors, n);
+        let far_off = here.set_aside as f64 > LARGEST_SET_ASIDE * (here.set_aside + here.counted[0]) as f64;
+        if far_off && best.is_none() {
+            // Not spikes but a hypothesis that does not fit yet: look at more of the data.
+            widened *= 4.0;
+            continue;
+        }
+        // Levenberg and Marquardt: a step that made things worse is taken back and shortened.
+        let worse = far_off || best.as_ref().is_some_and(|b| here.mean_square() > b.mean_square() * (1.0 + 1e-9));
+        let (from, last) = match (worse && !polishing, best.take()) {
+            (true, Some(b)) => {
+                damping = (damping * 10.0f64).max(1e-3);
+                result.hypothesis = b.hypothesis.clone();
+                result.starts.clone_from(&b.starts);
+                (b, false)
+            }
+            _ => {
+                damping = if damping > 1e-6 { 0.1 * damping } else { 0.0 };
+                (here, polishing)
+            }
+        };
+        let Some((step, covariance)) = solve(&from.normal, &from.right, damping, &considered) else { break };
+        from.apply(&step, &mut result);
+        if damping == 0.0 || result.covariance.iter().all(|v| *v == 0.0) {
+            result.covariance = covariance;
+        }
+        let deviation = |i: usize| result.covariance[(i, i)].max(0.0).sqrt();
+        let small = (0..n).all(|i| step[i].abs() <= CONVERGED * deviation(i) + f64::MIN_POSITIVE);
+        best = Some(from);
+        if last {
+            break;
+        }
+        if (small && damping == 0.0) || step_number + 2 >= effort.steps {
+            if !effort.polish {
+                break;
+            }
+            // the last step looks at all samples, and must not be compared with those that did not
+            polishing = true;
+            damping = 0.0;
+            best = None;
+        }
+    }
+    result
+}
+
+/// The least-squares problem around one hypothesis.
+struct Linearised {
+    hypothesis: Hypothesis,
+    starts: Vec<Vec<Start>>,
+    sums: Vec<Vec<Sums>>,
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+    chi2: [f64; 2],
+    prior_chi2: f64,
+    counted: [usize; 2],
+    set_aside: usize,
+}
+
+impl Linearised {
+    fn new(at: &Fit, sums: Vec<Vec<Sums>>, priors: &[Prior], n: usize) -> Self {
+        let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let (mut chi2, mut prior_chi2, mut counted, mut set_aside) = ([0.0; 2], 0.0, [0; 2], 0);
+        for s in sums.iter().flatten() {
+            chi2[0] += s.eliminate(&s.angle, &mut normal, &mut right);
+            chi2[1] += s.eliminate(&s.amplitude, &mut normal, &mut right);
+            counted[0] += s.counted[0];
+            counted[1] += s.counted[1];
+            set_aside += s.set_aside;
+        }
+        for p in priors {
+            if let Some(i) = at.unknowns.iter().position(|u| *u == p.unknown) {
+                let w = 1.0 / (p.deviation * p.deviation);
+                let off = p.mean - at.hypothesis.get(p.unknown);
+                normal[(i, i)] += w;
+                right[i] += w * off;
+                prior_chi2 += w * off * off;
+            }
+        }
+        let (hypothesis, starts) = (at.hypothesis.clone(), at.starts.clone());
+        Self { hypothesis, starts, sums, normal, right, chi2, prior_chi2, counted, set_aside }
+    }
+
+    fn mean_square(&self) -> f64 {
+        (self.chi2[0] + self.chi2[1] + self.prior_chi2) / (self.counted[0] + self.counted[1]).max(1) as f64
+    }
+
+    /// Moves `result` from here by `step`, biases and all.
+    fn apply(&self, step: &DVector<f64>, result: &mut Fit) {
+        (result.chi2, result.prior_chi2) = (self.chi2, self.prior_chi2);
+        (result.counted, result.set_aside) = (self.counted, self.set_aside);
+        result.step_gain = self.right.dot(step);
+        for (i, u) in result.unknowns.iter().enumerate() {
+            let value = self.hypothesis.get(*u) + step[i];
+            result.hypothesis.set(*u, value);
+        }
+        for ((sums, from), to) in self.sums.iter().zip(&self.starts).zip(&mut result.starts) {
+            for ((s, from), to) in sums.iter().zip(from).zip(to) {
+                to.angle = from.angle + s.start_shift(&s.angle, step);
+                to.amplitude = from.amplitude + s.start_shift(&s.amplitude, step);
+            }
+        }
+    }
+}
+
+/// Largest turn of the pattern between samples of a thinned track, rad: the integrals along it stay good to a percent.
+const LARGEST_TURN: f64 = 0.45;
+
+/// By how much a track is thinned while a fit converges.
+fn thinning(track: &Track, hypothesis: &Hypothesis, role: Role, effort: Effort) -> usize {
+    let samples = track.samples(role);
+    let interval = (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / (track.t_s.len().max(2) - 1) as f64;
+    let turn = (hypothesis.precession(track.mean_rate()) * interval).abs().max(1e-12);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
+    let resolved = (LARGEST_TURN / turn) as usize;
+    (samples / effort.thinned).min(resolved).max(track.stride)
+}
+
+/// Sums of all segments of a track; those of another role stay empty, so that the order of segments is kept.
+fn collect(
+    prepared: &Prepared,
+    starts: &[Start],
+    hypothesis: &Hypothesis,
+    unknowns: &Unknowns,
+    role: Role,
+    (stride, widened): (usize, f64),
+) -> Vec<Sums> {
+    let Prepared { track, noise, .. } = prepared;
+    let limit = Noise { angle: widened * prepared.limit.angle, amplitude: widened * prepared.limit.amplitude };
+    let worth = stride / track.stride;
+    let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * worth as f64);
+    track
+        .segments
+        .iter()
+        .zip(starts)
+        .map(|(segment, start)| {
+            let mut sums = Sums::new(unknowns.all.len());
+            if segment.role == role {
+                walk(track, segment, hypothesis, unknowns, *start, stride, |row| {
+                    if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
+                        Sums::add(&mut sums.angle, weights[0], row.angle_slopes, row.angle);
+                        sums.counted[0] += worth;
+                        if weights[1] > 0.0 {
+                            Sums::add(&mut sums.amplitude, weights[1], row.amplitude_slopes, row.amplitude);
+                            sums.counted[1] += worth;
+                        }
+                    } else {
+                        sums.set_aside += worth;
+                    }
+                });
+            }
+            sums
+        })
+        .collect()
+}
+
+/// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that; also gives the
+/// covariance. Considered unknowns, those with a deviation, do not move; what they could be shows in the covariance.
+fn solve(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    damping: f64,
+    considered: &[Option<f64>],
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let n = right.len();
+    let free: Vec<usize> = (0..n).filter(|&i| considered[i].is_none()).collect();
+    let held: Vec<(usize, f64)> = (0..n).filter_map(|i| considered[i].map(|d| (i, d))).collect();
+    let inverse = scaled_inverse(&normal.select_rows(&free).select_columns(&free), damping)?;
+    let (mut step, mut covariance) = (DVector::zeros(n), DMatrix::zeros(n, n));
+    let moved = &inverse * right.select_rows(&free);
+    for (a, &i) in free.iter().enumerate() {
+        step[i] = moved[a];
+        for (b, &j) in free.iter().enumerate() {
+            covariance[(i, j)] = inverse[(a, b)];
+        }
+    }
+    for &(c, deviation) in &held {
+        // a unit of the held unknown moves the free ones by −N⁻¹ n_c
+        let mut sensitivity = DVector::zeros(n);
+        let moved = -(&inverse * normal.column(c).select_rows(&free));
+        for (a, &i) in free.iter().enumerate() {
+            sensitivity[i] = moved[a];
+        }
+        sensitivity[c] = 1.0;
+        covariance.ger(deviation * deviation, &sensitivity, &sensitivity, 1.0);
+    }
+    step.iter().all(|s| s.is_finite()).then_some((step, covariance))
+}
+
+/// The inverse of a symmetric positive semidefinite matrix; directions without information carry a large variance
+/// instead of an infinite one.
+fn scaled_inverse(normal: &DMatrix<f64>, damping: f64) -> Option<DMatrix<f64>> {
+    let n = normal.nrows();
+    if n == 0 {
+        return Some(DMatrix::zeros(0, 0));
+    }
+    let scale = DVector::from_iterator(n, (0..n).map(|i| normal[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()));
+    let eigen = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]).symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    if !(largest.is_finite() && largest > 0.0) {
+        return None;
+    }
+    let floor = largest * 1e-13;
+    let weights = eigen.eigenvalues.map(|l| 1.0 / (l.max(floor) + damping));
+    let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&weights) * eigen.eigenvectors.transpose();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// What part of a segment is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Window {
+    /// all of it, as thinned as its track
+    Whole,
+    /// its beginning, every sample
+    Dense,
+}
+
+/// Samples of a dense window.
+const DENSE_SAMPLES: usize = 1 << 16;
+
+impl Window {
+    fn of(self, track: &Track, segment: &Segment) -> (Segment, usize) {
+        match self {
+            Self::Whole => (segment.clone(), track.stride),
+            Self::Dense => {
+                let r = &segment.range;
+                (Segment { range: r.start..r.end.min(r.start + DENSE_SAMPLES), role: segment.role }, 1)
+            }
+        }
+    }
+}
+
+/// The residuals of a hypothesis on the segments of `role`, per track.
+pub(crate) fn residuals(
+    tracks: &[Prepared],
+    hypothesis: &Hypothesis,
+    starts: &[Vec<Start>],
+    role: Role,
+    window: Window,
+) -> Vec<Vec<Residual>> {
+    let none = Unknowns::new(hypothesis, Vec::new());
+    tracks
+        .par_iter()
+        .zip(starts)
+        .enumerate()
+        .map(|(number, (prepared, starts))| {
+            let track = &prepared.track;
+            let mut out = Vec::new();
+            for (segment, start) in track.segments.iter().zip(starts) {
+                if segment.role == role {
+                    let (segment, stride) = window.of(track, segment);
+                    let mut r = Residual::new(number, &segment);
+                    walk(track, &segment, hypothesis, &none, *start, stride, |row| r.push(track, row));
+                    out.push(r);
+                }
+            }
+            out
+        })
+        .collect()
+}
+
+/// Residuals of one segment, as columns.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Residual {
+    pub(crate) track: usize,
+    pub(crate) samples: usize,
+    pub(crate) t_s: Vec<f64>,
+    /// input angle since the segment's start, and the table's, rad
+    pub(crate) turned: Vec<f64>,
+    pub(crate) table: Vec<f64>,
+    /// direction of the vibration over the full turn, rad
+    pub(crate) direction: Vec<f64>,
+    /// rad
+    pub(crate) angle: Vec<f64>,
+    pub(crate) amplitude: Vec<f64>,
+}
+
+impl Residual {
+    fn new(track: usize, segment: &Segment) -> Self {
+        Self { track, samples: segment.range.len(), ..Self::default() }
+    }
+
+    fn push(&mut self, track: &Track, row: &crate::pass::Row<'_>) {
+        self.t_s.push(track.t_s[row.index]);
+        self.turned.push(row.turned);
+        self.table.push(track.input_rad[row.index]);
+        self.direction.push(direction(&row.vibration));
+        self.angle.push(row.angle);
+        self.amplitude.push(row.amplitude);
+    }
+}
+
+/// Length of a block of the block covariance in samples: longer than what the noise remembers.
+const BLOCK: usize = 64;
+
+/// Covariance of a fit's unknowns that allows for autocorrelated residuals: scores summed over blocks of neighbouring
+/// samples (a cluster-robust sandwich).
+pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DMatrix<f64> {
+    let n = fit.unknowns.len();
+    let sorted = Unknowns::new(&fit.hypothesis, fit.unknowns.clone());
+    let meats: Vec<(DMatrix<f64>, usize)> = tracks
+        .par_iter()
+        .zip(&fit.starts)
+        .map(|(prepared, starts)| {
+            let mut meat = DMatrix::zeros(n, n);
+            let mut blocks = 0;
+            for (segment, start) in prepared.track.segments.iter().zip(starts).filter(|(s, _)| s.role == role) {
+                let mut angle = Scores::new(n);
+                let mut amplitude = Scores::new(n);
+                walk(&prepared.track, segment, &fit.hypothesis, &sorted, *start, prepared.track.stride, |row| {
+                    if row.angle.abs() <= prepared.limit.angle {
+                        angle.add(prepared.noise.angle.powi(-2), row.angle, row.angle_slopes);
+                        amplitude.add(prepared.noise.amplitude.powi(-2), row.amplitude, row.amplitude_slopes);
+                    }
+                });
+                blocks += angle.blocks.len();
+                for (a, b) in angle.centred().iter().zip(&amplitude.centred()) {
+                    let score = a + b;
+                    meat.ger(1.0, &score, &score, 1.0);
+                }
+            }
+            (meat, blocks)
+        })
+        .collect();
+    let blocks: usize = meats.iter().map(|m| m.1).sum();
+    let meat = meats.into_iter().fold(DMatrix::zeros(n, n), |sum, m| sum + m.0);
+    let finite = blocks as f64 / (blocks.saturating_sub(n)).max(1) as f64;
+    &fit.covariance * meat * &fit.covariance * finite
+}
+
+/// Scores w·r·slopes of one segment, block by block.
+struct Scores {
+    blocks: Vec<(f64, DVector<f64>)>,
+    in_block: usize,
+    weight: f64,
+    slopes: DVector<f64>,
+}
+
+impl Scores {
+    fn new(n: usize) -> Self {
+        Self { blocks: Vec::new(), in_block: BLOCK, weight: 0.0, slopes: DVector::zeros(n) }
+    }
+
+    fn add(&mut self, weight: f64, residual: f64, slopes: &[f64]) {
+        if self.in_block == BLOCK {
+            self.blocks.push((0.0, DVector::zeros(slopes.len())));
+            self.in_block = 0;
+        }
+        self.in_block += 1;
+        if let Some((rest, score)) = self.blocks.last_mut() {
+            *rest += weight * residual;
+            for (i, s) in slopes.iter().enumerate() {
+                score[i] += weight * residual * s;
+                self.slopes[i] += weight * s;
+            }
+        }
+        self.weight += weight;
+    }
+
+    /// The scores with the segment's bias eliminated: slopes less their mean.
+    fn centred(&self) -> Vec<DVector<f64>> {
+        let mean = &self.slopes / self.weight.max(f64::MIN_POSITIVE);
+        self.blocks.iter().map(|(rest, score)| score - &mean * *rest).collect()
+    }
+}

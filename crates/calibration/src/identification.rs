@@ -1,0 +1,457 @@
+//! The main job: a campaign in, the identified instrument out, with everything a reader needs to check it.
+
+use cvg_model::effects::{EffectId, Role as ParameterRole, Shown};
+use nalgebra::DMatrix;
+
+use crate::actuation::RingDown;
+use crate::calibration::Calibration;
+use crate::discovery::{Step, discover};
+use crate::error::Refusal;
+use crate::evaluate::{Evaluation, evaluate};
+use crate::fit::{Fit, Window, block_covariance};
+use crate::hypothesis::{Hypothesis, Member, Origin, Unknown};
+use crate::identifiability::{confounded_with, separated_by};
+use crate::identify::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::recording::{Campaign, Instrument, Role};
+use crate::report::{
+    BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA,
+};
+use crate::residual::{Follows, WHITENESS_LAGS, autocorrelation, harmonics, inflation, ljung_box, resolved_harmonics};
+use crate::unexplained::unexplained;
+
+/// How an identification is run.
+pub struct Options<'a> {
+    /// look for undeclared effects
+    pub discover: bool,
+    /// told what is going on
+    pub progress: &'a dyn Fn(&str),
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self { discover: true, progress: &|_| {} }
+    }
+}
+
+/// An identified instrument.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// the facts
+    pub report: Report,
+    /// what to compensate with
+    pub calibration: Calibration,
+    /// curves to look at
+    pub figures: Figures,
+    /// the steps of discovery
+    pub steps: Vec<Step>,
+}
+
+/// Curves for a report, thinned to what a figure can show.
+#[derive(Debug, Clone, Default)]
+pub struct Figures {
+    /// held-out angle error against the pattern angle
+    pub bias: Vec<BiasCurve>,
+    /// ring-downs: name, angle in deg, amplitude over time
+    pub ring_downs: Vec<RingDown>,
+}
+
+/// Angle error of one held-out stretch.
+#[derive(Debug, Clone, Default)]
+pub struct BiasCurve {
+    /// run
+    pub name: String,
+    /// pattern angle within its period, deg
+    pub pattern_deg: Vec<f64>,
+    /// raw error, deg; empty where the raw angle does not turn
+    pub raw_deg: Vec<f64>,
+    /// after the declared model, deg
+    pub declared_deg: Vec<f64>,
+    /// after all, deg
+    pub discovered_deg: Vec<f64>,
+}
+
+/// Points of one curve.
+const CURVE_POINTS: usize = 2000;
+/// Harmonics of the residual that are reported.
+const REPORTED_HARMONICS: u32 = 8;
+/// Share of its prior's width to which an unknown must narrow to count as told by the data.
+const TOLD: f64 = 0.1;
+/// Gain ratios known no better than this, as the half width of the interval, are no answer.
+const WIDEST_DETECTION_RATIO: f64 = 0.1;
+const WIDEST_ACTUATION_RATIO: f64 = 0.02;
+/// Significance of the whiteness test.
+const WHITENESS_LEVEL: f64 = 0.01;
+
+/// Identifies the instrument of a campaign.
+///
+/// # Errors
+/// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
+pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identification, Refusal> {
+    let device = campaign.device.clone();
+    let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
+    (options.progress)("preparing the runs");
+    let mut bench = Bench::new(campaign)?;
+    (options.progress)("fitting the declared model");
+    let paper = declared_hypothesis(&bench.start);
+    let declared = fit_with_ring_downs(&mut bench, &paper)?;
+    let declared_fit = declared.fit.clone();
+    let (fitted, steps) =
+        if options.discover { discover(&mut bench, declared, options.progress)? } else { (declared, Vec::new()) };
+    (options.progress)("measuring the held-out error");
+    let heldout = |h: &Hypothesis, fit: &Fit, like: Option<&Evaluation>| {
+        evaluate(&bench.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
+    };
+    let after = heldout(&fitted.fit.hypothesis, &fitted.fit, None);
+    let before = heldout(&declared_fit.hypothesis, &declared_fit, Some(&after));
+    let ideal = Hypothesis { members: Vec::new(), force_scale: 0.0, ..fitted.fit.hypothesis.clone() };
+    let raw = bench.raw_angle_turns.then(|| heldout(&ideal, &fitted.fit, Some(&after)));
+
+    let on_fit = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+    let dense = |role| evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, role, Window::Dense, None);
+    let noise_floor = dense(Role::Holdout).noise_floor();
+    let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
+    let count = on_fit.errors().count();
+    let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
+    let covariance = covariance(&bench, &fitted.fit, white);
+
+    let mut warnings = std::mem::take(&mut bench.warnings);
+    let knowledge = Knowledge { bench: &bench, fitted: &fitted, covariance: &covariance };
+    let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
+    let actuation_gain_ratio = knowledge.actuation_ratio(&mut warnings);
+    let effects = knowledge.effects(&steps, &after);
+    for e in effects.iter().filter(|e| !e.confounded_with.is_empty()) {
+        warnings.push(format!(
+            "{} is confounded with {} in this campaign; {} would separate them",
+            e.id,
+            e.confounded_with.join(", "),
+            e.separated_by.as_deref().unwrap_or("another run")
+        ));
+    }
+    let spikes = fitted.fit.set_aside + after.spikes();
+    if spikes > 0 {
+        warnings.push(format!("{spikes} samples were set aside as spikes"));
+    }
+    for (run, t) in runs.iter_mut().filter(|r| r.kind == "rotation").zip(&bench.tracks) {
+        run.rate_dps = Some(t.track.mean_rate().to_degrees());
+        run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
+            (true, true) => "fit, last quarter held out".into(),
+            (true, false) => "fit".into(),
+            _ => "holdout".into(),
+        };
+    }
+    for (run, r) in runs.iter_mut().filter(|r| r.kind != "rotation").zip(&fitted.ring_downs) {
+        run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
+    }
+    let unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
+    let report = Report {
+        schema: SCHEMA.into(),
+        device: device.clone(),
+        instrument: match bench.instrument {
+            Instrument::Gyroscope => "gyroscope".into(),
+            Instrument::Sensor => "sensor".into(),
+        },
+        angular_gain: knowledge.estimate(Unknown::AngularGain),
+        detection_gain_ratio,
+        actuation_gain_ratio,
+        effects,
+        heldout: Heldout {
+            raw: raw.as_ref().map(Evaluation::size),
+            declared: before.size(),
+            discovered: after.size(),
+            noise_floor_deg: noise_floor.to_degrees(),
+        },
+        residual: ResidualReport { harmonics: reported_harmonics(&after), white },
+        unexplained,
+        runs,
+        warnings,
+    };
+    Ok(Identification {
+        report,
+        figures: figures(&bench, raw.as_ref(), &before, &after, fitted.ring_downs),
+        calibration: Calibration { device, hypothesis: fitted.fit.hypothesis },
+        steps,
+    })
+}
+
+/// Covariance of the unknowns: that of white residuals, or the larger of it and the block covariance where they have
+/// memory.
+fn covariance(bench: &Bench, fit: &Fit, white: bool) -> DMatrix<f64> {
+    let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
+    let scale = ((fit.chi2[0] + fit.chi2[1]) / dof).max(f64::MIN_POSITIVE);
+    let plain = &fit.covariance * scale;
+    if white {
+        return plain;
+    }
+    let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
+    let n = fit.unknowns.len();
+    // raise each deviation to the larger of the two and keep the correlations
+    let raise: Vec<f64> =
+        (0..n).map(|i| (blocks[(i, i)] / plain[(i, i)].max(f64::MIN_POSITIVE)).max(1.0).sqrt()).collect();
+    DMatrix::from_fn(n, n, |i, j| plain[(i, j)] * raise[i] * raise[j])
+}
+
+fn run_report(run: &crate::recording::Run) -> RunReport {
+    let d = &run.recording.dropped;
+    RunReport {
+        file: run.file.display().to_string(),
+        kind: if run.kind == crate::recording::RunKind::Rotation { "rotation".into() } else { "ringdown".into() },
+        r#use: "fit".into(),
+        rows: run.recording.len(),
+        dropped: dropped(d),
+        rate_dps: None,
+        spikes: 0,
+        tau_s: None,
+    }
+}
+
+/// Why rows of a file are not in its recording.
+fn dropped(d: &crate::recording::Dropped) -> Vec<String> {
+    [
+        (d.empty_or_nan, "empty or not a number"),
+        (d.repeated_time, "repeated time stamp"),
+        (d.truncated_last_line, "cut-off last line"),
+    ]
+    .into_iter()
+    .filter(|(tally, _)| !tally.is_zero())
+    .map(|(tally, reason)| {
+        let first = tally.first.map(|p| format!(", first at {p}")).unwrap_or_default();
+        format!("{} × {reason}{first}", tally.count)
+    })
+    .collect()
+}
+
+fn reported_harmonics(after: &Evaluation) -> Vec<crate::residual::Harmonic> {
+    let inflated = inflation(&autocorrelation(after, WHITENESS_LAGS), after.errors().count());
+    [Follows::Pattern, Follows::Table]
+        .into_iter()
+        .flat_map(|of| harmonics(after, of, resolved_harmonics(after, of, REPORTED_HARMONICS), inflated))
+        .collect()
+}
+
+fn figures(
+    bench: &Bench,
+    raw: Option<&Evaluation>,
+    before: &Evaluation,
+    after: &Evaluation,
+    ring_downs: Vec<RingDown>,
+) -> Figures {
+    let degrees = |e: &Evaluation, s: usize, kept: &[usize]| -> Vec<f64> {
+        kept.iter().map(|&i| e.segments[s].angle[i].to_degrees()).collect()
+    };
+    let bias = (0..after.segments.len())
+        .map(|s| {
+            let segment = &after.segments[s];
+            let stride = (segment.angle.len() / CURVE_POINTS).max(1);
+            let kept: Vec<usize> = (0..segment.angle.len()).step_by(stride).filter(|&i| after.kept[s][i]).collect();
+            let period = bench.start.period_rad;
+            BiasCurve {
+                name: bench.tracks[segment.track].track.name.clone(),
+                pattern_deg: kept.iter().map(|&i| segment.direction[i].rem_euclid(period).to_degrees()).collect(),
+                raw_deg: raw.map(|r| degrees(r, s, &kept)).unwrap_or_default(),
+                declared_deg: degrees(before, s, &kept),
+                discovered_deg: degrees(after, s, &kept),
+            }
+        })
+        .collect();
+    Figures { bias, ring_downs }
+}
+
+/// What a fit knows, with how sure it is.
+struct Knowledge<'a> {
+    bench: &'a Bench,
+    fitted: &'a Fitted,
+    covariance: &'a DMatrix<f64>,
+}
+
+impl Knowledge<'_> {
+    fn hypothesis(&self) -> &Hypothesis {
+        &self.fitted.fit.hypothesis
+    }
+
+    fn index(&self, unknown: Unknown) -> Option<usize> {
+        self.fitted.fit.unknowns.iter().position(|u| *u == unknown)
+    }
+
+    fn deviation(&self, unknown: Unknown) -> f64 {
+        self.index(unknown).map_or(0.0, |i| self.covariance[(i, i)].max(0.0).sqrt())
+    }
+
+    fn estimate(&self, unknown: Unknown) -> Estimate {
+        Estimate::new(self.hypothesis().get(unknown), self.deviation(unknown))
+    }
+
+    /// The first parameter of the first member `id`, if it was fitted.
+    fn first(&self, id: EffectId) -> Option<Unknown> {
+        let unknown = Unknown::Effect(self.hypothesis().position(id)?, 0);
+        self.index(unknown).map(|_| unknown)
+    }
+
+    fn detection_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+        let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
+        let told = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
+        if told.is_none() {
+            warnings.push("the campaign cannot tell the detection gain ratio".into());
+        }
+        told
+    }
+
+    fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+        if self.bench.instrument == Instrument::Sensor {
+            return None;
+        }
+        let unknown = self.first(EffectId::ActuationGainMismatch);
+        let told = unknown
+            .filter(|u| self.deviation(*u) < TOLD * belief::ACTUATION_RATIO)
+            .map(|u| self.estimate(u))
+            .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
+            .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
+        match (&told, &self.fitted.drive) {
+            (None, _) => warnings.push(
+                "the campaign cannot tell the actuation gain ratio: ring-downs at 0° and 90° with vas_v would".into(),
+            ),
+            (Some(_), None) => warnings.push(
+                "the actuation gain ratio comes from rotation runs alone: ring-downs at 0° and 90° would confirm it"
+                    .into(),
+            ),
+            (Some(estimate), Some(drive)) => {
+                let deviation = (estimate.half_width() / 1.96).hypot(drive.ratio() * drive.ratio_error);
+                if (estimate.value - drive.ratio()).abs() > 4.0 * deviation {
+                    warnings.push(format!(
+                        "ring-downs (Equation 11) give an actuation gain ratio of {:.5}, all runs together {:.5}",
+                        drive.ratio(),
+                        estimate.value
+                    ));
+                }
+            }
+        }
+        told
+    }
+
+    /// A member's deviations are well below what was believed without data.
+    fn told(&self, at: usize, member: &Member) -> bool {
+        let scale = match member.id {
+            EffectId::Anisodamping => belief::ANISODAMPING_PER_S,
+            EffectId::Anisoelasticity => belief::ANISOELASTICITY_RAD_S,
+            EffectId::ActuationGainMismatch => belief::ACTUATION_RATIO,
+            _ => f64::INFINITY,
+        };
+        let fitted = (0..member.id.description().parameters.len())
+            .map(|p| Unknown::Effect(at, p))
+            .filter(|u| self.index(*u).is_some())
+            .collect::<Vec<_>>();
+        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < TOLD * scale)
+    }
+
+    fn effects(&self, steps: &[Step], after: &Evaluation) -> Vec<EffectReport> {
+        let with = after.size().rms_deg;
+        let mut steps: Vec<&Step> = steps.iter().collect();
+        self.hypothesis()
+            .members
+            .iter()
+            .enumerate()
+            .filter(|(at, m)| self.told(*at, m))
+            .map(|(at, m)| {
+                let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
+                let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
+                for r in step.map(|s| s.confounded_with.as_slice()).unwrap_or_default() {
+                    if !rivals.contains(r) {
+                        rivals.push(*r);
+                    }
+                }
+                let mut without = self.hypothesis().clone();
+                without.members.remove(at);
+                let before = step.map_or_else(
+                    || {
+                        let e = evaluate(
+                            &self.bench.tracks,
+                            &without,
+                            &self.fitted.fit.starts,
+                            Role::Holdout,
+                            Window::Whole,
+                            Some(after),
+                        );
+                        e.size().rms_deg
+                    },
+                    |s| s.heldout_rms_deg[0],
+                );
+                let after_deg = step.map_or(with, |s| s.heldout_rms_deg[1]);
+                EffectReport {
+                    id: m.id.to_string(),
+                    origin: m.origin,
+                    parameters: self.parameters(at, m),
+                    heldout_rms_deg: before.is_finite().then_some(BeforeAfter { before, after: after_deg }),
+                    evidence: evidence(m, step),
+                    separated_by: rivals.first().map(|r| separated_by(m.id, *r).to_string()),
+                    confounded_with: rivals.iter().map(ToString::to_string).collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// A member's parameters as they are shown, polar ones with intervals by propagation.
+    fn parameters(&self, at: usize, member: &Member) -> Vec<ParameterReport> {
+        let d = member.id.description();
+        let mut out = Vec::new();
+        for shown in d.shown {
+            match *shown {
+                Shown::Plain(p) => {
+                    let parameter = &d.parameters[p];
+                    let hidden = parameter.role == ParameterRole::Refined && !member.refined;
+                    if !hidden {
+                        let unknown = Unknown::Effect(at, p);
+                        out.push(ParameterReport {
+                            name: parameter.name.into(),
+                            unit: parameter.unit.into(),
+                            value: member.values[p],
+                            ci95: self.index(unknown).map(|_| self.estimate(unknown).ci95),
+                        });
+                    }
+                }
+                Shown::Polar { cos, sin, magnitude, unit, angle, division } => {
+                    let (c, s) = (member.values[cos], member.values[sin]);
+                    let size = c.hypot(s).max(f64::MIN_POSITIVE);
+                    let (vc, vs, vcs) = self.block(at, cos, sin);
+                    let deviation = ((c * c * vc + s * s * vs + 2.0 * c * s * vcs).max(0.0)).sqrt() / size;
+                    let turn = ((s * s * vc + c * c * vs - 2.0 * c * s * vcs).max(0.0)).sqrt() / (size * size);
+                    let phase = (s.atan2(c) / division).to_degrees();
+                    let phase_deviation = (turn / division).to_degrees();
+                    let entry = |name: &str, unit: &str, e: Estimate| ParameterReport {
+                        name: name.into(),
+                        unit: unit.into(),
+                        value: e.value,
+                        ci95: Some(e.ci95),
+                    };
+                    out.push(entry(magnitude, unit, Estimate::new(c.hypot(s), deviation)));
+                    out.push(entry(angle, "deg", Estimate::new(phase, phase_deviation)));
+                }
+            }
+        }
+        out
+    }
+
+    /// Variances and covariance of two parameters of a member.
+    fn block(&self, at: usize, one: usize, other: usize) -> (f64, f64, f64) {
+        match (self.index(Unknown::Effect(at, one)), self.index(Unknown::Effect(at, other))) {
+            (Some(i), Some(j)) => (self.covariance[(i, i)], self.covariance[(j, j)], self.covariance[(i, j)]),
+            _ => (0.0, 0.0, 0.0),
+        }
+    }
+}
+
+/// One sentence on why an effect is believed.
+fn evidence(member: &Member, step: Option<&Step>) -> String {
+    let d = member.id.description();
+    let Some(step) = step else {
+        return match member.origin {
+            Origin::Declared => format!("declared by the paper's model ({})", d.signature),
+            _ => format!("needed to centre the readout before there is an angle ({})", d.signature),
+        };
+    };
+    let rivals =
+        step.rivals.iter().map(|(id, gain)| format!("{id} by {:.0}", step.gain - gain)).collect::<Vec<_>>().join(", ");
+    let beaten = if rivals.is_empty() { String::new() } else { format!("; beat {rivals}") };
+    format!(
+        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°",
+        d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
+    )
+}

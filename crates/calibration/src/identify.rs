@@ -1,0 +1,406 @@
+//! From a campaign to an identified instrument: prepare, fit what is declared, and what the residual asks for.
+
+use cvg_model::effects::{EffectId, Stage};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::actuation::{DriveGains, RingDown, ring_down};
+use crate::error::Refusal;
+use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
+use crate::hypothesis::{Hypothesis, Origin, Unknown, Unknowns};
+use crate::pass::walk;
+use crate::recording::{Campaign, Instrument, Role, RunKind};
+use crate::start::{Ellipse, motion};
+use crate::statistics::{robust_deviation, white_noise};
+use crate::track::Track;
+
+/// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
+pub mod belief {
+    /// Δ(1/τ) along either axis, 1/s: four times the paper's device
+    pub const ANISODAMPING_PER_S: f64 = 0.02;
+    /// Δω along either axis, rad/s: a split of 1 Hz
+    pub const ANISOELASTICITY_RAD_S: f64 = 6.3;
+    /// ln(G_Ax/G_Ay)
+    pub const ACTUATION_RATIO: f64 = 0.15;
+    /// control latency, s
+    pub const CONTROL_LATENCY_S: f64 = 2e-3;
+    /// the energy command cannot change the amplitude faster than this, 1/s
+    pub const FORCING_PER_S: f64 = 3.0;
+}
+
+/// Residuals further out than this many robust deviations are spikes.
+const SPIKE: f64 = 6.0;
+/// Rates that differ by less than this share count as one.
+pub(crate) const SAME_RATE: f64 = 0.05;
+/// What the energy balance leaves of ln a, and how far it is trusted at best.
+const BALANCE_NOISE: f64 = 1e-3;
+const BALANCE_SHARE: f64 = 0.3;
+/// A split that the quadrature balance cannot rule out, rad/s.
+const LEAST_ANISOELASTICITY: f64 = 0.02;
+/// The smallest noise that is believed, rad: rounding of the angle itself.
+const LEAST_NOISE: f64 = 1e-9;
+
+/// A campaign made ready for fits.
+#[derive(Debug)]
+pub(crate) struct Bench {
+    pub(crate) instrument: Instrument,
+    pub(crate) tracks: Vec<Prepared>,
+    pub(crate) start: Hypothesis,
+    pub(crate) ring_down_runs: Vec<crate::recording::Run>,
+    pub(crate) warnings: Vec<String>,
+    /// the ellipse of a sensor's readout
+    pub(crate) ellipse: Option<Ellipse>,
+    /// rms of the energy and the quadrature command per unit of amplitude, V/V
+    pub(crate) command_rms: [f64; 2],
+    /// force scale and its uncertainty as the amplitude tells it, where no ring-down does
+    pub(crate) energy_balance: Option<(f64, f64)>,
+    /// Δω along both axes and its uncertainty, rad/s, as the quadrature loop tells it
+    pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
+    /// the raw angle could be followed without centring the ellipse
+    pub(crate) raw_angle_turns: bool,
+}
+
+impl Bench {
+    /// Prepares a campaign.
+    ///
+    /// # Errors
+    /// Where a run is not what the campaign says it is, or tells nothing.
+    pub(crate) fn new(campaign: Campaign) -> Result<Self, Refusal> {
+        let instrument = campaign.instrument;
+        let default_period = if instrument == Instrument::Sensor { 360.0 } else { 180.0 };
+        let period_rad = campaign.period_deg.unwrap_or(default_period).to_radians();
+        let (rotations, ring_down_runs): (Vec<_>, Vec<_>) =
+            campaign.runs.into_iter().partition(|r| r.kind == RunKind::Rotation);
+        let mut warnings: Vec<String> = Vec::new();
+        for r in rotations.iter().chain(&ring_down_runs) {
+            warnings.extend(r.recording.warnings.iter().cloned());
+        }
+        let split = rotations.iter().all(|r| r.role == Role::Fit);
+        let tracks: Vec<Track> =
+            rotations.into_iter().map(|r| Track::new(r, period_rad, split)).collect::<Result<_, _>>()?;
+        if tracks.iter().all(|t| t.samples(Role::Fit) == 0) {
+            return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
+        }
+        let mut start = Hypothesis::ideal(instrument, period_rad, campaign.angular_gain.unwrap_or(0.8));
+        let mut raw_angle_turns = true;
+        let by_ellipse = instrument == Instrument::Sensor && tracks.iter().all(Track::has_amplitude);
+        let ellipse = by_ellipse.then(|| Ellipse::through(&tracks)).flatten();
+        if let Some(ellipse) = ellipse.filter(|e| !e.contains_origin()) {
+            // there is no angle to fit before the ellipse is centred
+            ellipse.install(&mut start);
+            raw_angle_turns = false;
+        }
+        if !raw_angle_turns {
+            warnings.push(
+                "the readout's offsets exceed its amplitude, so that the raw angle does not turn: the ellipse was \
+                 centred first, and heldout.raw is null"
+                    .into(),
+            );
+        }
+        let mut prepared = Vec::new();
+        let mut gains = Vec::new();
+        for track in tracks {
+            let motion = motion(&track, &start, campaign.angular_gain)?;
+            if motion.travel < std::f64::consts::PI {
+                return Err(Refusal::new(
+                    &track.name,
+                    format!("the pattern turns through {:.1}° only", motion.travel.to_degrees()),
+                    "at least half a turn (180°)",
+                ));
+            }
+            gains.push((motion.angular_gain, motion.travel.powi(2) * track.t_s.len() as f64));
+            let limit = Noise { angle: SPIKE * motion.deviation + LEAST_NOISE, amplitude: f64::INFINITY };
+            let by_amplitude = instrument == Instrument::Sensor && track.has_amplitude();
+            let noise = Noise {
+                angle: motion.deviation.max(LEAST_NOISE),
+                amplitude: if by_amplitude { motion.deviation.max(LEAST_NOISE) } else { f64::INFINITY },
+            };
+            let white = noise;
+            prepared.push(Prepared { noise, white, limit, starts: motion.starts, track });
+        }
+        let weight: f64 = gains.iter().map(|g| g.1).sum();
+        start.angular_gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight;
+        // Which way a sensor counts is a matter of its wiring: the campaign's own sign is kept.
+        let stated = campaign.angular_gain.unwrap_or(start.angular_gain);
+        if instrument == Instrument::Sensor && stated * start.angular_gain < 0.0 {
+            start.follows_input = true;
+            start.angular_gain = -start.angular_gain;
+        }
+        let command_rms = command_rms(&prepared);
+        Ok(Self {
+            instrument,
+            ellipse,
+            command_rms,
+            tracks: prepared,
+            start,
+            ring_down_runs,
+            warnings,
+            energy_balance: None,
+            quadrature_balance: None,
+            raw_angle_turns,
+        })
+    }
+
+    /// The unknowns of a hypothesis on this campaign: what the recorded columns can speak of at all.
+    ///
+    /// What the commands do beside their scale is left alone unless runs at two or more rates, or in both directions,
+    /// can tell it from the rest.
+    pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
+        self.unknowns_of(hypothesis, self.tracks_differ())
+    }
+
+    fn unknowns_of(&self, hypothesis: &Hypothesis, drive: bool) -> Vec<Unknown> {
+        let mut all = vec![Unknown::AngularGain];
+        let commands = drive && self.tracks.iter().any(|t| t.track.has_commands());
+        let quadrature = self.tracks.iter().any(|t| t.track.has_quadrature());
+        if self.instrument == Instrument::Gyroscope && commands {
+            all.extend([Unknown::ForceScale, Unknown::ControlLatency]);
+        }
+        all.extend(hypothesis.effect_unknowns().into_iter().filter(|u| match u {
+            Unknown::Effect(i, _) => match hypothesis.members[*i].id {
+                EffectId::Anisoelasticity => quadrature,
+                id => commands || !(id.description().stage == Stage::Actuation && id.description().declared),
+            },
+            _ => true,
+        }));
+        all
+    }
+
+    /// Follows every run anew under another hypothesis: where its segments start, and how far off it may be.
+    pub(crate) fn restart(&mut self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
+        for p in &mut self.tracks {
+            let motion = motion(&p.track, hypothesis, Some(hypothesis.angular_gain))?;
+            let off = motion.deviation.max(LEAST_NOISE);
+            p.noise.angle = off;
+            if p.noise.amplitude.is_finite() {
+                p.noise.amplitude = off;
+            }
+            p.limit = Noise { angle: SPIKE * off, amplitude: f64::INFINITY };
+            p.starts = motion.starts;
+        }
+        Ok(())
+    }
+
+    /// Fitted runs were made at two or more rates, or in both directions.
+    pub(crate) fn tracks_differ(&self) -> bool {
+        let mut rates = self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0).map(Track::mean_rate);
+        rates.next().is_some_and(|first| rates.any(|r| (r - first).abs() > SAME_RATE * first.abs()))
+    }
+
+    /// Priors for the unknowns that the data may be silent about.
+    pub(crate) fn priors(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Vec<Prior> {
+        let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
+        let mut all = vec![prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S)];
+        let mut effect = |id, p, mean, deviation| {
+            if let Some(member) = hypothesis.position(id) {
+                all.push(prior(Unknown::Effect(member, p), mean, deviation));
+            }
+        };
+        for p in 0..2 {
+            effect(EffectId::Anisodamping, p, 0.0, belief::ANISODAMPING_PER_S);
+            let (mean, deviation) = self
+                .quadrature_balance
+                .map_or((0.0, belief::ANISOELASTICITY_RAD_S), |(w, deviation)| (w[p], deviation));
+            effect(EffectId::Anisoelasticity, p, mean, deviation);
+        }
+        let ratio = drive.map_or((1.0, belief::ACTUATION_RATIO), |d| (d.ratio(), d.ratio() * d.ratio_error.max(1e-6)));
+        effect(EffectId::ActuationGainMismatch, 0, ratio.0, ratio.1);
+        let silent = (0.0, belief::FORCING_PER_S / self.command_rms[0].hypot(self.command_rms[1]).max(1e-9));
+        let scale =
+            drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(self.energy_balance).unwrap_or(silent);
+        all.push(prior(Unknown::ForceScale, scale.0, scale.1));
+        // At one rate the sine part of anisodamping is a detection gain mismatch to the last digit: it is held, and
+        // widens the interval of that.
+        if let Some(member) = hypothesis.position(EffectId::Anisodamping).filter(|_| !self.tracks_differ()) {
+            for p in all.iter_mut().filter(|p| p.unknown == Unknown::Effect(member, 1)) {
+                p.considered = true;
+            }
+        }
+        all
+    }
+
+    /// The force scale from the energy balance alone: how the amplitude answers to the energy command. The amplitude's
+    /// own noise wanders, so this is a belief for the fit of the angle and not a part of it.
+    fn balance_energy(&mut self, hypothesis: &mut Hypothesis) {
+        let usable = |p: &Prepared| p.track.has_commands() && p.track.has_amplitude();
+        if self.instrument == Instrument::Sensor || !self.tracks.iter().all(usable) {
+            return;
+        }
+        let kept: Vec<(Noise, Noise)> = self.tracks.iter().map(|p| (p.noise, p.limit)).collect();
+        for p in &mut self.tracks {
+            p.noise = Noise { angle: f64::INFINITY, amplitude: BALANCE_NOISE };
+            p.limit = Noise { angle: f64::INFINITY, amplitude: f64::INFINITY };
+        }
+        let mut unknowns = vec![Unknown::ForceScale, Unknown::Damping];
+        if let Some(member) = hypothesis.position(EffectId::Anisodamping) {
+            unknowns.extend([Unknown::Effect(member, 0), Unknown::Effect(member, 1)]);
+        }
+        self.energy_balance = None;
+        let priors = self.priors(hypothesis, None);
+        let result = fit(&self.tracks, hypothesis, &unknowns, &priors, Role::Fit, Effort::ROUGH);
+        let (scale, deviation) = (result.hypothesis.force_scale, result.covariance[(0, 0)].sqrt());
+        if scale > 2.0 * deviation {
+            self.energy_balance = Some((scale, deviation.max(BALANCE_SHARE * scale)));
+            hypothesis.force_scale = scale;
+        }
+        for (p, kept) in self.tracks.iter_mut().zip(kept) {
+            (p.noise, p.limit) = kept;
+        }
+    }
+
+    /// Δω from the quadrature balance, q̇ = G v_qc + ½a(Δω sin2θ_ω cos2θ − Δω cos2θ_ω sin2θ), at the hypothesis' force
+    /// scale: what the loop had to cancel. A belief for the fit of the angle, where Δω shows only through the
+    /// quadrature that is left.
+    fn balance_quadrature(&mut self, hypothesis: &Hypothesis) {
+        self.quadrature_balance = None;
+        let usable = |p: &Prepared| p.track.has_commands() && p.track.has_quadrature();
+        if hypothesis.force_scale == 0.0 || !self.tracks.iter().all(usable) {
+            return;
+        }
+        let none = Unknowns::new(hypothesis, Vec::new());
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for p in &self.tracks {
+            for (segment, start) in p.track.segments.iter().zip(&p.starts).filter(|(s, _)| s.role == Role::Fit) {
+                let stride = p.track.stride;
+                let mut last: Option<(f64, [f64; 3])> = None;
+                let (mut sums, mut rows) = ([0.0; 3], Vec::new());
+                walk(&p.track, segment, hypothesis, &none, *start, stride, |row| {
+                    let pendulum = row.vibration.pendulum();
+                    let line = pendulum.r.hypot(pendulum.s);
+                    let Some(v) = p.track.commands(row.index, stride).filter(|_| line > 0.0) else { return };
+                    let (sin, cos) = (pendulum.s / line, pendulum.r / line);
+                    let command = hypothesis.force_scale * v.now.v_qc / pendulum.e.sqrt();
+                    let rates = [command, -0.5 * sin, 0.5 * cos];
+                    let t = p.track.t_s[row.index];
+                    if let Some((t0, before)) = last {
+                        for ((sum, a), b) in sums.iter_mut().zip(before).zip(rates) {
+                            *sum += 0.5 * (t - t0) * (a + b);
+                        }
+                    }
+                    last = Some((t, rates));
+                    rows.push([0.5 * pendulum.q / pendulum.e - sums[0], sums[1], sums[2]]);
+                });
+                let n = rows.len().max(1) as f64;
+                let mean = rows.iter().fold([0.0; 3], |m, r| std::array::from_fn(|i| m[i] + r[i] / n));
+                for r in &rows {
+                    let x = Vector2::new(r[1] - mean[1], r[2] - mean[2]);
+                    normal += x * x.transpose();
+                    right += x * (r[0] - mean[0]);
+                }
+            }
+        }
+        if let Some(w) = normal.try_inverse().map(|i| i * right) {
+            let deviation = BALANCE_SHARE * w.norm() + LEAST_ANISOELASTICITY;
+            self.quadrature_balance = Some(([w[0], w[1]], deviation));
+        }
+    }
+
+    /// Measures the noise of every track from what a fit leaves, and sets the limits beyond which a residual is a spike.
+    pub(crate) fn measure_noise(&mut self, fit: &Fit) {
+        let rests = residuals(&self.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Dense);
+        for (prepared, segments) in self.tracks.iter_mut().zip(rests) {
+            if segments.is_empty() {
+                continue;
+            }
+            let longest = segments.iter().max_by_key(|s| s.samples);
+            if let Some(s) = longest {
+                prepared.white = Noise {
+                    angle: white_noise(&s.angle).max(LEAST_NOISE),
+                    amplitude: white_noise(&s.amplitude).max(LEAST_NOISE),
+                };
+            }
+            let angle = robust_deviation(segments.iter().flat_map(|s| s.angle.iter().copied()));
+            let amplitude = robust_deviation(segments.iter().flat_map(|s| s.amplitude.iter().copied()));
+            // Weights follow what is really left, so that a misfit cannot outvote a prior or another run.
+            prepared.noise.angle = angle.max(prepared.white.angle);
+            if prepared.noise.amplitude.is_finite() {
+                prepared.noise.amplitude = amplitude.max(prepared.white.amplitude);
+            }
+            prepared.limit =
+                Noise { angle: SPIKE * angle.max(LEAST_NOISE), amplitude: SPIKE * amplitude.max(LEAST_NOISE) };
+        }
+    }
+}
+
+/// rms of the energy and the quadrature command per unit of amplitude over all tracks, V/V.
+fn command_rms(tracks: &[Prepared]) -> [f64; 2] {
+    let (mut n, mut squares) = (0.0, [0.0; 2]);
+    for track in tracks.iter().map(|p| &p.track) {
+        for i in (0..track.t_s.len()).step_by((track.t_s.len() / 2000).max(1)) {
+            let e = track.envelope(i).pendulum().e;
+            if let Some(v) = track.commands(i, 1).filter(|_| e > 0.0) {
+                n += 1.0;
+                squares[0] += v.now.v_as * v.now.v_as / e;
+                squares[1] += v.now.v_qc * v.now.v_qc / e;
+            }
+        }
+    }
+    squares.map(|s: f64| if n > 0.0 { (s / n).sqrt() } else { 0.0 })
+}
+
+/// A hypothesis fitted, and what the ring-downs said.
+#[derive(Debug)]
+pub(crate) struct Fitted {
+    pub(crate) fit: Fit,
+    pub(crate) ring_downs: Vec<RingDown>,
+    pub(crate) drive: Option<DriveGains>,
+}
+
+/// The paper's model for an instrument: the effects that are declared.
+pub(crate) fn declared_hypothesis(start: &Hypothesis) -> Hypothesis {
+    let mut hypothesis = start.clone();
+    for &id in EffectId::ALL {
+        let d = id.description();
+        if d.declared && hypothesis.member(id).is_none() && (d.in_sensors || start.instrument == Instrument::Gyroscope)
+        {
+            hypothesis.admit(id, Origin::Declared);
+        }
+    }
+    hypothesis
+}
+
+/// Rounds of fit, noise and spikes.
+const ROUNDS: usize = 3;
+
+/// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
+///
+/// # Errors
+/// Where a ring-down is not one.
+pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) -> Result<Fitted, Refusal> {
+    let mut hypothesis = hypothesis.clone();
+    hypothesis.control_latency_s = 0.0;
+    if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
+        hypothesis.set(Unknown::Effect(member, 0), 1.0);
+    }
+    let mut round = 0;
+    loop {
+        // the drive first: it multiplies all that the commands do
+        let ring_downs =
+            bench.ring_down_runs.iter().map(|r| ring_down(r, &hypothesis)).collect::<Result<Vec<_>, _>>()?;
+        let drive = DriveGains::from_ring_downs(&ring_downs);
+        match &drive {
+            Some(d) => {
+                hypothesis.force_scale = d.mean();
+                if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
+                    hypothesis.set(Unknown::Effect(member, 0), d.ratio());
+                }
+            }
+            None => bench.balance_energy(&mut hypothesis),
+        }
+        bench.balance_quadrature(&hypothesis);
+        let last = round + 1 == ROUNDS;
+        // What the commands do is adjusted last: it multiplies, and a misfit would drag it along.
+        let unknowns = bench.unknowns_of(&hypothesis, last && bench.tracks_differ());
+        let priors = bench.priors(&hypothesis, drive.as_ref());
+        let effort = if last { Effort::FULL } else { Effort::ROUGH };
+        let result = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, effort);
+        hypothesis = result.hypothesis.clone();
+        for (p, s) in bench.tracks.iter_mut().zip(&result.starts) {
+            p.starts.clone_from(s);
+        }
+        if last {
+            return Ok(Fitted { fit: result, ring_downs, drive });
+        }
+        bench.measure_noise(&result);
+        round += 1;
+    }
+}

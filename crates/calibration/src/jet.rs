@@ -1,0 +1,168 @@
+//! First-order forward differentiation: a value and its slopes against a few unknowns.
+//!
+//! The library's effects are generic over [`Real`], so their exact derivatives come from running them on this scalar.
+//! The orphan rule keeps a third-party dual number from being a [`Real`]; a wrapper would be as long as this file.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+use std::cmp::Ordering;
+
+use cvg_model::Real;
+
+/// How many unknowns one evaluation differentiates against.
+pub(crate) const LANES: usize = 4;
+
+/// A value with its slopes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Jet {
+    pub(crate) value: f64,
+    pub(crate) slope: [f64; LANES],
+}
+
+impl Jet {
+    /// A value that does not depend on the unknowns.
+    pub(crate) fn constant(value: f64) -> Self {
+        Self { value, slope: [0.0; LANES] }
+    }
+
+    /// The unknown of `lane` itself.
+    pub(crate) fn unknown(value: f64, lane: usize) -> Self {
+        let mut jet = Self::constant(value);
+        jet.slope[lane] = 1.0;
+        jet
+    }
+
+    /// f(self) given f and f′ at the value.
+    #[inline]
+    fn chain(self, value: f64, derivative: f64) -> Self {
+        Self { value, slope: self.slope.map(|s| s * derivative) }
+    }
+
+    /// u·self + v·other in the slopes.
+    #[inline]
+    fn combine(self, other: Self, value: f64, u: f64, v: f64) -> Self {
+        Self { value, slope: core::array::from_fn(|i| u * self.slope[i] + v * other.slope[i]) }
+    }
+}
+
+impl PartialEq for Jet {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl PartialOrd for Jet {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        self.value.partial_cmp(&other.value)
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+    #[inline]
+    fn add(self, o: Self) -> Self {
+        self.combine(o, self.value + o.value, 1.0, 1.0)
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+    #[inline]
+    fn sub(self, o: Self) -> Self {
+        self.combine(o, self.value - o.value, 1.0, -1.0)
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: Self) -> Self {
+        self.combine(o, self.value * o.value, o.value, self.value)
+    }
+}
+
+impl Div for Jet {
+    type Output = Self;
+    #[inline]
+    fn div(self, o: Self) -> Self {
+        let q = self.value / o.value;
+        self.combine(o, q, 1.0 / o.value, -q / o.value)
+    }
+}
+
+impl Neg for Jet {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        self.chain(-self.value, -1.0)
+    }
+}
+
+impl Real for Jet {
+    #[inline]
+    fn ratio(numerator: i32, denominator: i32) -> Self {
+        Self::constant(f64::ratio(numerator, denominator))
+    }
+
+    #[inline]
+    fn sqrt(self) -> Self {
+        let root = self.value.sqrt();
+        // At 0 the slope is infinite; the magnitudes that are rooted here enter multiplied by themselves.
+        self.chain(root, if root > 0.0 { 0.5 / root } else { 0.0 })
+    }
+
+    #[inline]
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.value.sin_cos();
+        (self.chain(sin, cos), self.chain(cos, -sin))
+    }
+
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        let norm2 = self.value * self.value + x.value * x.value;
+        let k = if norm2 > 0.0 { 1.0 / norm2 } else { 0.0 };
+        self.combine(x, self.value.atan2(x.value), x.value * k, -self.value * k)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cvg_model::Envelope;
+    use cvg_model::effects::{EffectId, Moment, Stage, Values};
+
+    #[test]
+    fn slopes_of_every_readout_effect_are_those_of_finite_differences() {
+        let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8 };
+        let z = Envelope::new(0.7, 0.01, -0.6, -0.02);
+        for &id in EffectId::ALL.iter().filter(|e| e.description().stage == Stage::Readout) {
+            let parameters = id.description().parameters;
+            let mut values: Values<f64> = id.neutral();
+            for (v, p) in values.iter_mut().zip(parameters) {
+                *v += 3.0 * p.scale;
+            }
+            let jets: Values<Jet> = core::array::from_fn(|i| Jet::unknown(values[i], i));
+            let lift = |e: Envelope<f64>| {
+                Envelope::new(Jet::constant(e.x_c), Jet::constant(e.x_s), Jet::constant(e.y_c), Jet::constant(e.y_s))
+            };
+            let at_jet = Moment {
+                t_s: Jet::constant(at.t_s),
+                table_rad: Jet::constant(at.table_rad),
+                precession_rad_s: Jet::constant(at.precession_rad_s),
+            };
+            let exact = id.unread(&jets, lift(z), &at_jet).y_c;
+            for (i, p) in parameters.iter().enumerate() {
+                let h = 1e-4 * p.scale;
+                let (mut up, mut down) = (values, values);
+                up[i] += h;
+                down[i] -= h;
+                let numeric = (id.unread(&up, z, &at).y_c - id.unread(&down, z, &at).y_c) / (2.0 * h);
+                assert!(
+                    (exact.slope[i] - numeric).abs() < 1e-4 * (1.0 + numeric.abs()),
+                    "{id} {}: {} against {numeric}",
+                    p.name,
+                    exact.slope[i]
+                );
+            }
+        }
+    }
+}

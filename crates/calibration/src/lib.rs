@@ -1,0 +1,40 @@
+//! What a recording tells of a gyroscope.
+//!
+//! One idea: **undo the electronics; what remains must obey the mechanics.** Every readout effect is a map of the
+//! envelope with an inverse. Behind the right inverse, the pattern must precess as the equation of motion says, driven
+//! by the input rotation and by the commands that were recorded with it. The fit looks for the instrument that leaves
+//! nothing but noise.
+//!
+//! [`recording`] reads files, [`identify()`] answers, [`calibration`] keeps the answer, [`compensate()`] puts it to use.
+//! This crate knows nothing of the simulator, and renders nothing.
+#![forbid(unsafe_code)]
+
+pub mod actuation;
+pub mod bias;
+pub mod calibration;
+mod compensate;
+pub mod discovery;
+mod error;
+mod evaluate;
+mod fit;
+mod hypothesis;
+pub mod identifiability;
+mod identification;
+mod identify;
+mod jet;
+mod pass;
+pub mod recording;
+pub mod report;
+mod residual;
+mod start;
+mod statistics;
+mod track;
+mod unexplained;
+
+pub use compensate::compensate;
+pub use error::{Cause, Refusal};
+pub use evaluate::ErrorSize;
+pub use hypothesis::{Hypothesis, Member, Origin, Unknown};
+pub use identification::{BiasCurve, Figures, Identification, Options, identify};
+pub use identify::belief;
+pub use residual::{Follows, Harmonic};

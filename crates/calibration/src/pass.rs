@@ -1,0 +1,187 @@
+//! One pass of a hypothesis over a segment of a track: at each sample, what is left of the angle and of the amplitude
+//! when the hypothesis has said all it can, and how that changes with the unknowns.
+//!
+//! The angle must obey Equation 1 and the mechanics, θ = θ_b ± kα + ∫θ̇ dt; ln of the amplitude must obey the energy
+//! balance, ln a = c + ∫ȧ/a dt. The integrals are taken along the measured motion, so that a large pattern angle never
+//! enters a linearisation. Nothing is stored: one hour at 1 kHz costs no more memory than one second.
+
+use cvg_model::Envelope;
+use cvg_model::effects::Moment;
+
+use crate::hypothesis::{Hypothesis, Unknowns, Vibration, quantity};
+use crate::jet::Jet;
+use crate::track::{Segment, Track, wrapped};
+
+/// What a pass says of one sample.
+#[derive(Debug)]
+pub(crate) struct Row<'a> {
+    /// sample of the track
+    pub(crate) index: usize,
+    /// input angle since the start of the segment, rad
+    pub(crate) turned: f64,
+    /// the vibration
+    pub(crate) vibration: Envelope<f64>,
+    /// precession by the mechanics and the commands since the start of the segment, rad
+    pub(crate) drift: f64,
+    /// input angle that the input effects added since then, rad
+    pub(crate) excess: f64,
+    /// angle observed minus predicted, rad, within ± half a period
+    pub(crate) angle: f64,
+    /// ln of the amplitude, observed minus predicted
+    pub(crate) amplitude: f64,
+    /// change of the predicted angle (less the observed) per unknown
+    pub(crate) angle_slopes: &'a [f64],
+    /// change of the predicted ln amplitude (less the observed) per unknown
+    pub(crate) amplitude_slopes: &'a [f64],
+}
+
+/// Where a segment starts: what the integrals do not know.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Start {
+    /// pattern angle at zero input angle of the segment, rad: the bias θ_b
+    pub(crate) angle: f64,
+    /// ln of the amplitude
+    pub(crate) amplitude: f64,
+}
+
+/// Walks `segment` in steps of `stride` samples and hands each row to `take`.
+pub(crate) fn walk(
+    track: &Track,
+    segment: &Segment,
+    hypothesis: &Hypothesis,
+    unknowns: &Unknowns,
+    start: Start,
+    stride: usize,
+    mut take: impl FnMut(&Row<'_>),
+) {
+    let n = unknowns.all.len();
+    let mut vibration = Vibration::new();
+    // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
+    let mut integrals = Integrals::new(2 * (n + 1));
+    let mut excess = Jet::constant(0.0);
+    let mut integrands = vec![0.0; 2 * (n + 1)];
+    let (mut angle_slopes, mut amplitude_slopes) = (vec![0.0; n], vec![0.0; n]);
+    let sense = hypothesis.sense();
+    let harmonic = hypothesis.input_harmonic();
+    let zero_input = track.input_rad[segment.range.start];
+    let mut last: Option<usize> = None;
+    for i in segment.range.clone().step_by(stride) {
+        let rate = track.rate(i);
+        let at =
+            Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: hypothesis.precession(rate) };
+        hypothesis.evaluate(track.envelope(i), track.commands(i, stride), &at, unknowns, &mut vibration);
+        if hypothesis.instrument == crate::recording::Instrument::Gyroscope {
+            integrands[0] = vibration.theta_rate;
+            integrands[n + 1] = vibration.growth;
+            for (u, s) in vibration.slopes.iter().enumerate() {
+                integrands[1 + u] = s[quantity::THETA_RATE];
+                integrands[n + 2 + u] = s[quantity::GROWTH];
+            }
+            integrals.extend_to(track.t_s[i], &integrands);
+        }
+        if let Some(from) = last.filter(|_| harmonic > 0.0) {
+            excess = excess + excess_angle(track, from, i, hypothesis, unknowns, harmonic);
+        }
+        last = Some(i);
+        let turned = track.input_rad[i] - zero_input;
+        let input = turned + excess.value;
+        let predicted = start.angle + sense * hypothesis.angular_gain * input + integrals.sum[0];
+        let ln_a = start.amplitude + integrals.sum[n + 1];
+        for (u, s) in vibration.slopes.iter().enumerate() {
+            angle_slopes[u] = integrals.sum[1 + u] - s[quantity::THETA];
+            amplitude_slopes[u] = integrals.sum[n + 2 + u] - s[quantity::LN_AMPLITUDE];
+        }
+        if let Some(k) = unknowns.angular_gain {
+            angle_slopes[k] = sense * input;
+        }
+        for (lane, &u) in unknowns.input.columns.iter().enumerate() {
+            angle_slopes[u] = sense * hypothesis.angular_gain * excess.slope[lane];
+        }
+        take(&Row {
+            index: i,
+            turned,
+            vibration: vibration.envelope,
+            drift: integrals.sum[0],
+            excess: excess.value,
+            angle: wrapped(vibration.theta - predicted, hypothesis.period_rad),
+            amplitude: vibration.ln_amplitude - ln_a,
+            angle_slopes: &angle_slopes,
+            amplitude_slopes: &amplitude_slopes,
+        });
+    }
+}
+
+/// Largest step of the table's harmonic within one quadrature interval, rad.
+const LARGEST_PHASE_STEP: f64 = 0.5;
+
+/// The input angle that the input effects add between two samples, rad, with slopes: two-point Gauss quadrature on
+/// pieces over which the table's harmonic turns little. Between samples the table turns evenly.
+fn excess_angle(
+    track: &Track,
+    from: usize,
+    to: usize,
+    hypothesis: &Hypothesis,
+    unknowns: &Unknowns,
+    harmonic: f64,
+) -> Jet {
+    let (t0, t1) = (track.t_s[from], track.t_s[to]);
+    let (a0, a1) = (track.input_rad[from], track.input_rad[to]);
+    let rate = (a1 - a0) / (t1 - t0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
+    let pieces = ((harmonic * (a1 - a0).abs() / LARGEST_PHASE_STEP).ceil() as usize).clamp(1, 10_000);
+    let h = 1.0 / pieces as f64;
+    let mut sum = Jet::constant(0.0);
+    for piece in 0..pieces {
+        for node in [-0.5 / 3f64.sqrt(), 0.5 / 3f64.sqrt()] {
+            let s = h * (piece as f64 + 0.5 + node);
+            let at = Moment {
+                t_s: t0 + s * (t1 - t0),
+                table_rad: a0 + s * (a1 - a0),
+                precession_rad_s: hypothesis.precession(rate),
+            };
+            sum = sum + hypothesis.excess_rate(rate, &at, &unknowns.input);
+        }
+    }
+    sum * Jet::constant(0.5 * h * (t1 - t0))
+}
+
+/// Running integrals of sampled quantities: the Adams–Moulton rule of fourth order on even samples, the trapezium
+/// where the spacing changes.
+struct Integrals {
+    sum: Vec<f64>,
+    /// the last three integrands, newest first, and their times
+    past: [Vec<f64>; 3],
+    times: [f64; 3],
+    known: usize,
+}
+
+impl Integrals {
+    fn new(n: usize) -> Self {
+        Self { sum: vec![0.0; n], past: [vec![0.0; n], vec![0.0; n], vec![0.0; n]], times: [0.0; 3], known: 0 }
+    }
+
+    fn extend_to(&mut self, t: f64, f: &[f64]) {
+        if self.known > 0 {
+            let h = t - self.times[0];
+            let even = self.known == 3
+                && ((self.times[0] - self.times[1]) - h).abs() < 0.01 * h
+                && ((self.times[1] - self.times[2]) - h).abs() < 0.01 * h;
+            let [p1, p2, p3] = &self.past;
+            if even {
+                let k = h / 24.0;
+                for (i, s) in self.sum.iter_mut().enumerate() {
+                    *s += k * (9.0 * f[i] + 19.0 * p1[i] - 5.0 * p2[i] + p3[i]);
+                }
+            } else {
+                for (i, s) in self.sum.iter_mut().enumerate() {
+                    *s += 0.5 * h * (f[i] + p1[i]);
+                }
+            }
+        }
+        self.past.rotate_right(1);
+        self.past[0].copy_from_slice(f);
+        self.times.rotate_right(1);
+        self.times[0] = t;
+        self.known = (self.known + 1).min(3);
+    }
+}

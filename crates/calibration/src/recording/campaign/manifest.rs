@@ -1,0 +1,248 @@
+//! The text of a campaign file into what it says: every key known, every value checked, every refusal with its line.
+//!
+//! No other file is opened here.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::{Instrument, Role, RunKind};
+use crate::recording::error::ReadError;
+
+/// A place in the campaign file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Position {
+    /// Line, from 1.
+    pub(super) line: usize,
+    /// Column, in characters, from 1.
+    pub(super) column: usize,
+}
+
+/// A run as the campaign file has it.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    pub(super) kind: RunKind,
+    pub(super) file: PathBuf,
+    /// Where the file is named.
+    pub(super) at: Position,
+    pub(super) settle_s: f64,
+    pub(super) role: Role,
+    pub(super) amplitude: Option<f64>,
+}
+
+/// What a campaign file says.
+#[derive(Debug, Clone)]
+pub(super) struct Manifest {
+    pub(super) device: String,
+    pub(super) instrument: Instrument,
+    pub(super) carrier_hz: Option<f64>,
+    pub(super) angular_gain: Option<f64>,
+    pub(super) period_deg: Option<f64>,
+    pub(super) runs: Vec<Entry>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// A refusal of something at a place of the file.
+pub(super) fn refuse(path: &Path, at: Position, what: String, wanted: String) -> ReadError {
+    ReadError::Campaign { path: path.to_path_buf(), line: at.line, column: at.column, what, wanted }
+}
+
+const CAMPAIGN_KEYS: &[&str] = &["device", "instrument", "carrier_hz", "angular_gain", "period_deg"];
+const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude"];
+const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
+
+/// Understands a campaign file.
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Manifest, ReadError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => {
+            let read = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+            let end = read.len();
+            return Err(Text { text: &read, path }.refuse(end..end, "the text is not UTF-8", "TOML in UTF-8"));
+        }
+    };
+    let text = Text { text, path };
+    let document = DeTable::parse(text.text)
+        .map_err(|error| text.refuse(error.span().unwrap_or(0..0), error.message().to_owned(), "valid TOML"))?;
+    text.manifest(document.get_ref())
+}
+
+/// The text of the file, to tell places in it.
+struct Text<'a> {
+    text: &'a str,
+    path: &'a Path,
+}
+
+type Value<'a> = Spanned<DeValue<'a>>;
+
+impl Text<'_> {
+    fn position(&self, span: &Range<usize>) -> Position {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        Position { line: before.matches('\n').count() + 1, column: before[line_start..].chars().count() + 1 }
+    }
+
+    fn refuse(&self, span: Range<usize>, what: impl Into<String>, wanted: impl Into<String>) -> ReadError {
+        refuse(self.path, self.position(&span), what.into(), wanted.into())
+    }
+
+    fn manifest(&self, document: &DeTable<'_>) -> Result<Manifest, ReadError> {
+        self.refuse_unknown(document, &["campaign", "run"], "at the top of a campaign file")?;
+        let Some(campaign) = get(document, "campaign") else {
+            return Err(self.refuse(0..0, "there is no `[campaign]`", "a table `[campaign]` with the key `device`"));
+        };
+        let head = campaign.get_ref().as_table().ok_or_else(|| {
+            self.refuse(campaign.span(), "`campaign` is not a table", "a table `[campaign]` with the key `device`")
+        })?;
+        self.refuse_unknown(head, CAMPAIGN_KEYS, "in `[campaign]`")?;
+        let mut warnings = vec![];
+        let device = if let Some(value) = get(head, "device") {
+            self.string(value, "device")?.to_owned()
+        } else {
+            let name = self.path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+            let name = name.unwrap_or_else(|| "unnamed".to_owned());
+            let file = self.path.display();
+            warnings.push(format!("{file}: `device` is not given; `{name}` is taken, the name of the folder"));
+            name
+        };
+        let instruments = [("gyroscope", Instrument::Gyroscope), ("sensor", Instrument::Sensor)];
+        let instrument = self.choice(head, "instrument", &instruments)?.unwrap_or_default();
+        let carrier_hz = self.number(head, "carrier_hz", "a positive number of Hz", |value| value > 0.0)?;
+        let angular_gain = self.number(head, "angular_gain", "a number other than 0", |value| value != 0.0)?;
+        let period_deg = self.number(head, "period_deg", "180 or 360", |value| value == 180.0 || value == 360.0)?;
+        let runs = self.runs(document, instrument)?;
+        Ok(Manifest { device, instrument, carrier_hz, angular_gain, period_deg, runs, warnings })
+    }
+
+    fn runs(&self, document: &DeTable<'_>, instrument: Instrument) -> Result<Vec<Entry>, ReadError> {
+        const WANTED: &str = "at least one `[[run]]` with `kind = \"rotation\"` and a `file`";
+        let Some(runs) = get(document, "run") else {
+            return Err(self.refuse(0..0, "there is no `[[run]]`", WANTED));
+        };
+        let Some(list) = runs.get_ref().as_array() else {
+            return Err(self.refuse(runs.span(), "`run` is not a list of tables", "each run as a table `[[run]]`"));
+        };
+        let mut entries = vec![];
+        for run in list {
+            let Some(table) = run.get_ref().as_table() else {
+                return Err(self.refuse(run.span(), "a run is not a table", "each run as a table `[[run]]`"));
+            };
+            entries.push(self.run(table, run.span(), instrument)?);
+        }
+        let is_rotation = |entry: &&Entry| entry.kind == RunKind::Rotation;
+        if !entries.iter().any(|entry| is_rotation(&entry)) {
+            return Err(self.refuse(runs.span(), "no run is a rotation", WANTED));
+        }
+        if entries.iter().filter(is_rotation).all(|entry| entry.role == Role::Holdout) {
+            let what = "every rotation run has `use = \"holdout\"`, so that nothing is left to fit";
+            return Err(self.refuse(runs.span(), what, "a rotation run with `use = \"fit\"`, the default"));
+        }
+        Ok(entries)
+    }
+
+    fn run(&self, table: &DeTable<'_>, span: Range<usize>, instrument: Instrument) -> Result<Entry, ReadError> {
+        let kinds = [("rotation", false), ("ringdown", true)];
+        let Some(is_ringdown) = self.choice(table, "kind", &kinds)? else {
+            return Err(self.refuse(span, "this run has no `kind`", "`kind = \"rotation\"` or `kind = \"ringdown\"`"));
+        };
+        if is_ringdown && instrument == Instrument::Sensor {
+            let what = "a sensor has nothing that rings down";
+            return Err(self.refuse(span, what, "rotation runs only, or `instrument = \"gyroscope\"`"));
+        }
+        let (keys, place) =
+            if is_ringdown { (RINGDOWN_KEYS, "in a ring-down") } else { (ROTATION_KEYS, "in a rotation run") };
+        self.refuse_unknown(table, keys, place)?;
+        let Some(file) = get(table, "file") else {
+            return Err(self.refuse(span, "this run has no `file`", "the path of a recording, relative to this file"));
+        };
+        let name = self.string(file, "file")?;
+        if name.is_empty() {
+            return Err(self.refuse(file.span(), "`file` is empty", "the path of a recording, relative to this file"));
+        }
+        let required = |key: &str, wanted: &str, is_right: fn(f64) -> bool| {
+            let missing =
+                || self.refuse(span.clone(), format!("this ring-down has no `{key}`"), format!("`{key}`, {wanted}"));
+            self.number(table, key, wanted, is_right)?.ok_or_else(missing)
+        };
+        let kind = if is_ringdown {
+            RunKind::Ringdown {
+                angle_deg: required("angle_deg", "the angle in degrees at which the pattern is held", |_| true)?,
+                energy_off_s: required(
+                    "energy_off_s",
+                    "the positive time in s at which the energy loop goes off",
+                    |value| value > 0.0,
+                )?,
+            }
+        } else {
+            RunKind::Rotation
+        };
+        Ok(Entry {
+            kind,
+            file: PathBuf::from(name),
+            at: self.position(&file.span()),
+            settle_s: self.number(table, "settle_s", "0 or more seconds", |value| value >= 0.0)?.unwrap_or(0.0),
+            role: self.choice(table, "use", &[("fit", Role::Fit), ("holdout", Role::Holdout)])?.unwrap_or_default(),
+            amplitude: self.number(table, "amplitude", "a positive relative amplitude", |value| value > 0.0)?,
+        })
+    }
+
+    /// Refuses the first key that has no meaning.
+    fn refuse_unknown(&self, table: &DeTable<'_>, known: &[&str], place: &str) -> Result<(), ReadError> {
+        let unknown =
+            table.keys().filter(|key| !known.contains(&key.get_ref().as_ref())).min_by_key(|key| key.span().start);
+        let Some(key) = unknown else {
+            return Ok(());
+        };
+        let names: Vec<String> = known.iter().map(|key| format!("`{key}`")).collect();
+        let what = format!("the key `{}` has no meaning {place}", key.get_ref());
+        Err(self.refuse(key.span(), what, format!("one of {}", names.join(", "))))
+    }
+
+    fn string<'v>(&self, value: &'v Value<'_>, key: &str) -> Result<&'v str, ReadError> {
+        let wrong = || self.refuse(value.span(), format!("`{key}` is not a string"), "text in quotes");
+        value.get_ref().as_str().ok_or_else(wrong)
+    }
+
+    fn choice<T: Copy>(&self, table: &DeTable<'_>, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, ReadError> {
+        let Some(value) = get(table, key) else {
+            return Ok(None);
+        };
+        let word = self.string(value, key)?;
+        if let Some(&(_, choice)) = choices.iter().find(|(name, _)| *name == word) {
+            return Ok(Some(choice));
+        }
+        let names: Vec<String> = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        Err(self.refuse(value.span(), format!("`{key}` is {word:?}"), names.join(" or ")))
+    }
+
+    fn number(
+        &self,
+        table: &DeTable<'_>,
+        key: &str,
+        wanted: &str,
+        is_right: fn(f64) -> bool,
+    ) -> Result<Option<f64>, ReadError> {
+        let Some(value) = get(table, key) else {
+            return Ok(None);
+        };
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().replace('_', "").parse::<f64>().ok(),
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()).ok().map(|value| value as f64)
+            }
+            _ => None,
+        };
+        let written = self.text.get(value.span()).unwrap_or_default();
+        match number.filter(|number| number.is_finite() && is_right(*number)) {
+            Some(number) => Ok(Some(number)),
+            None => Err(self.refuse(value.span(), format!("`{key}` is {written}"), wanted)),
+        }
+    }
+}
+
+fn get<'t, 'a>(table: &'t DeTable<'a>, key: &str) -> Option<&'t Value<'a>> {
+    table.iter().find(|(name, _)| name.get_ref().as_ref() == key).map(|(_, value)| value)
+}

@@ -1,0 +1,238 @@
+//! A campaign: the runs that were made with one instrument, each with its recording.
+//!
+//! Opens a campaign file with all its recordings, or a single recording as a campaign of one run. Columns that a kind of
+//! run needs are asked for; whether they show what the campaign says they show is the identification's to find out.
+
+mod manifest;
+
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::Recording;
+use super::error::ReadError;
+use manifest::{Manifest, Position};
+
+/// What kind of instrument was recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Instrument {
+    /// A whole-angle gyroscope: loops, mechanics, ring-downs.
+    #[default]
+    Gyroscope,
+    /// A two-channel angle sensor: a readout and nothing else.
+    Sensor,
+}
+
+/// What was done in a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RunKind {
+    /// The instrument was turned.
+    Rotation,
+    /// The pattern was held while the energy loop was switched off.
+    Ringdown {
+        /// Angle at which the rate loop holds the pattern, deg.
+        angle_deg: f64,
+        /// Time at which the energy loop is switched off, s, on the time axis of the recording; positive.
+        energy_off_s: f64,
+    },
+}
+
+/// What a run is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Role {
+    /// Parameters are fitted to it.
+    #[default]
+    Fit,
+    /// The result is tested on it, and nothing is fitted to it.
+    Holdout,
+}
+
+/// One run of a campaign.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// What was done.
+    pub kind: RunKind,
+    /// The recording's file as the campaign names it; [`Recording::source`] is where it was found.
+    pub file: PathBuf,
+    /// Time at the start of the run that is not used, s; zero or more.
+    pub settle_s: f64,
+    /// What it is used for.
+    pub role: Role,
+    /// Relative set amplitude, positive.
+    pub amplitude: Option<f64>,
+    /// What was recorded.
+    pub recording: Recording,
+}
+
+impl Run {
+    /// The rows that are left after settling: from [`Run::settle_s`] after the first time stamp on.
+    ///
+    /// # Errors
+    /// [`ReadError::NothingSettled`] where no row is left.
+    pub fn settled(&self) -> Result<Range<usize>, ReadError> {
+        let t_s = &self.recording.t_s;
+        let first_s = t_s.first().copied().unwrap_or(0.0);
+        let start = t_s.partition_point(|&t_s| t_s - first_s < self.settle_s);
+        if start < t_s.len() {
+            return Ok(start..t_s.len());
+        }
+        let duration_s = t_s.last().copied().unwrap_or(0.0) - first_s;
+        let path = self.recording.source.clone();
+        Err(ReadError::NothingSettled { path, settle_s: self.settle_s, duration_s })
+    }
+}
+
+/// The runs made with one instrument.
+#[derive(Debug, Clone, Default)]
+pub struct Campaign {
+    /// The campaign file, or the recording where there is no campaign file.
+    pub source: PathBuf,
+    /// Name of the instrument.
+    pub device: String,
+    /// Its kind.
+    pub instrument: Instrument,
+    /// Frequency of the carrier, Hz; positive.
+    pub carrier_hz: Option<f64>,
+    /// Start value of the angular gain, not zero; negative for an angle that counts the other way.
+    pub angular_gain: Option<f64>,
+    /// Period of the angle from I/Q, deg: 180 for a pattern angle, 360 for a full-turn sensor.
+    pub period_deg: Option<f64>,
+    /// The runs, in the order of the file.
+    pub runs: Vec<Run>,
+    /// What a reader of the result should know of the campaign file; the recordings have their own warnings.
+    pub warnings: Vec<String>,
+}
+
+impl Campaign {
+    /// Opens a campaign file (`.toml`) with all its recordings, or any other file as a recording of one rotation.
+    ///
+    /// # Errors
+    /// [`ReadError`]: the campaign file says something it cannot mean, or a recording is not there, is refused, lacks
+    /// columns that its kind of run needs, or has no row left after settling.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let is_manifest = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+        if is_manifest { Self::open_manifest(path) } else { Self::of_one(path) }
+    }
+
+    fn of_one(path: &Path) -> Result<Self, ReadError> {
+        let recording = Recording::read(path)?;
+        recording.require_rotation()?;
+        let run = Run {
+            kind: RunKind::Rotation,
+            file: path.file_name().map(PathBuf::from).unwrap_or_default(),
+            settle_s: 0.0,
+            role: Role::Fit,
+            amplitude: None,
+            recording,
+        };
+        let device = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(Self { source: path.to_path_buf(), device, runs: vec![run], ..Self::default() })
+    }
+
+    fn open_manifest(path: &Path) -> Result<Self, ReadError> {
+        let io = |error| ReadError::io(path, error);
+        if std::fs::metadata(path).map_err(io)?.is_dir() {
+            return Err(ReadError::Directory { path: path.to_path_buf() });
+        }
+        let manifest = manifest::parse(&std::fs::read(path).map_err(io)?, path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut runs: Vec<Run> = vec![];
+        let mut warnings = manifest.warnings.clone();
+        for entry in &manifest.runs {
+            let file = folder.join(&entry.file);
+            let recording = Recording::read(&file).map_err(|error| explain(error, path, &entry.file, entry.at))?;
+            match entry.kind {
+                RunKind::Rotation => recording.require_rotation()?,
+                RunKind::Ringdown { .. } => recording.require_ringdown()?,
+            }
+            if runs.iter().any(|other| other.recording.source == file) {
+                warnings.push(format!(
+                    "{}: line {}: `{}` is named by more than one run",
+                    path.display(),
+                    entry.at.line,
+                    entry.file.display()
+                ));
+            }
+            let run = Run {
+                kind: entry.kind,
+                file: entry.file.clone(),
+                settle_s: entry.settle_s,
+                role: entry.role,
+                amplitude: entry.amplitude,
+                recording,
+            };
+            run.settled()?;
+            runs.push(run);
+        }
+        let Manifest { device, instrument, carrier_hz, angular_gain, period_deg, .. } = manifest;
+        Ok(Self {
+            source: path.to_path_buf(),
+            device,
+            instrument,
+            carrier_hz,
+            angular_gain,
+            period_deg,
+            runs,
+            warnings,
+        })
+    }
+
+    /// All warnings: the campaign's, then those of each recording.
+    pub fn all_warnings(&self) -> impl Iterator<Item = &str> {
+        let recordings = self.runs.iter().flat_map(|run| &run.recording.warnings);
+        self.warnings.iter().chain(recordings).map(String::as_str)
+    }
+
+    /// The campaign file that says this, with the runs' files as [`Run::file`] names them.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut text = format!("[campaign]\ndevice = {}\n", quoted(&self.device));
+        if self.instrument == Instrument::Sensor {
+            text.push_str("instrument = \"sensor\"\n");
+        }
+        push_number(&mut text, "carrier_hz", self.carrier_hz);
+        push_number(&mut text, "angular_gain", self.angular_gain);
+        push_number(&mut text, "period_deg", self.period_deg);
+        for run in &self.runs {
+            let kind = if run.kind == RunKind::Rotation { "rotation" } else { "ringdown" };
+            let file = quoted(&run.file.to_string_lossy());
+            // Writing to a string does not fail.
+            let _ = write!(text, "\n[[run]]\nkind = \"{kind}\"\nfile = {file}\n");
+            if let RunKind::Ringdown { angle_deg, energy_off_s } = run.kind {
+                push_number(&mut text, "angle_deg", Some(angle_deg));
+                push_number(&mut text, "energy_off_s", Some(energy_off_s));
+            }
+            push_number(&mut text, "settle_s", Some(run.settle_s).filter(|&settle_s| settle_s > 0.0));
+            if run.role == Role::Holdout {
+                text.push_str("use = \"holdout\"\n");
+            }
+            push_number(&mut text, "amplitude", run.amplitude);
+        }
+        text
+    }
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}
+
+fn push_number(text: &mut String, key: &str, value: Option<f64>) {
+    if let Some(value) = value {
+        let _ = writeln!(text, "{key} = {}", toml::Value::from(value));
+    }
+}
+
+/// An error of a run's file that is not there says where the campaign names it; others speak for themselves.
+fn explain(error: ReadError, path: &Path, file: &Path, at: Position) -> ReadError {
+    let (found, looked_for) = match &error {
+        ReadError::NotFound { path } => ("is not there", path.clone()),
+        ReadError::Directory { path } => ("is a directory", path.clone()),
+        _ => return error,
+    };
+    manifest::refuse(
+        path,
+        at,
+        format!("the file `{}` of this run {found} (looked for {})", file.display(), looked_for.display()),
+        "a recording, with its path relative to this file".to_owned(),
+    )
+}

@@ -1,0 +1,108 @@
+//! The columns that a recording can have: their names, units and meaning.
+//!
+//! This is the one place that knows the names. It does not say which of them a run needs (`requirement.rs`) and holds no data.
+
+use std::fmt;
+
+/// A column of a recording whose meaning is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Channel {
+    /// `t_s`: time, s.
+    Time,
+    /// `rate_dps`: input rate, commanded or measured, deg/s.
+    Rate,
+    /// `table_deg`: reference angle of the table, deg, any wrapping.
+    Table,
+    /// `xc_v`: demodulated readout of X, in phase, V.
+    Xc,
+    /// `xs_v`: demodulated readout of X, in quadrature, V.
+    Xs,
+    /// `yc_v`: demodulated readout of Y, in phase, V.
+    Yc,
+    /// `ys_v`: demodulated readout of Y, in quadrature, V.
+    Ys,
+    /// `theta_deg`: the instrument's own angle, deg, any wrapping.
+    Theta,
+    /// `vas_v`: output of the energy controller, V.
+    Vas,
+    /// `vqc_v`: output of the quadrature controller, V.
+    Vqc,
+    /// `temp_c`: temperature, °C.
+    Temperature,
+}
+
+impl Channel {
+    /// All channels, in the order in which a recording is written that was not read from a file.
+    pub const ALL: [Self; 11] = [
+        Self::Time,
+        Self::Rate,
+        Self::Table,
+        Self::Xc,
+        Self::Xs,
+        Self::Yc,
+        Self::Ys,
+        Self::Theta,
+        Self::Vas,
+        Self::Vqc,
+        Self::Temperature,
+    ];
+
+    /// The column name, unit included.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Time => "t_s",
+            Self::Rate => "rate_dps",
+            Self::Table => "table_deg",
+            Self::Xc => "xc_v",
+            Self::Xs => "xs_v",
+            Self::Yc => "yc_v",
+            Self::Ys => "ys_v",
+            Self::Theta => "theta_deg",
+            Self::Vas => "vas_v",
+            Self::Vqc => "vqc_v",
+            Self::Temperature => "temp_c",
+        }
+    }
+
+    /// The channel of a column name; case and surrounding blanks do not matter.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        let name = name.trim();
+        Self::ALL.into_iter().find(|channel| channel.name().eq_ignore_ascii_case(name))
+    }
+
+    /// Whether a row without this value is of no use.
+    ///
+    /// True for the time, the reference (`rate_dps`, `table_deg`) and the angle (`xc_v`, `xs_v`, `yc_v`, `ys_v`,
+    /// `theta_deg`): a row with a missing cell in one of these is dropped. False for controller outputs and temperature:
+    /// there a missing cell is NaN.
+    #[must_use]
+    pub const fn is_needed_in_every_row(self) -> bool {
+        !matches!(self, Self::Vas | Self::Vqc | Self::Temperature)
+    }
+}
+
+impl fmt::Display for Channel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_found_whatever_its_case_and_blanks() {
+        assert_eq!(Channel::of(" XC_V "), Some(Channel::Xc));
+        assert_eq!(Channel::of("xc"), None);
+    }
+
+    #[test]
+    fn every_channel_is_found_by_its_own_name() {
+        for channel in Channel::ALL {
+            assert_eq!(Channel::of(channel.name()), Some(channel));
+        }
+    }
+}

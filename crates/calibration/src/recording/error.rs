@@ -1,0 +1,234 @@
+//! What can be wrong with a file: what it is, where it is, and what would be right.
+//!
+//! These errors speak of files only. Whether a well-formed recording tells anything of the instrument is the
+//! identification's to say.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// Where in a file: lines of text start at 1 (the header counts), rows of a table without lines as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Place {
+    /// Line of a text file, from 1.
+    Line(u64),
+    /// Row of a Parquet file, from 1.
+    Row(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Row(row) => write!(f, "row {row}"),
+        }
+    }
+}
+
+/// Why a recording or a campaign was refused.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// Nothing has this path.
+    #[error("{}: there is no such file", path.display())]
+    NotFound {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The path is a directory.
+    #[error("{}: is a directory; wanted a recording (.csv, .parquet) or a campaign file (campaign.toml)", path.display())]
+    Directory {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The system could not read the file.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Io {
+        /// The path as given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is of another kind than a recording.
+    #[error("{}: {what}; wanted {wanted}", path.display())]
+    Format {
+        /// The path as given.
+        path: PathBuf,
+        /// What it is.
+        what: String,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// There is nothing in the file.
+    #[error("{}: is empty; wanted a header line and rows", path.display())]
+    Empty {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The header is there, the rows are not.
+    #[error("{}: {place} is the header and no rows follow it", path.display())]
+    NoRows {
+        /// The path as given.
+        path: PathBuf,
+        /// The header.
+        place: Place,
+    },
+    /// The header cannot be understood.
+    #[error("{}: line {line}: {what}; wanted {wanted}", path.display())]
+    Header {
+        /// The path as given.
+        path: PathBuf,
+        /// Line of the header, from 1.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// Two columns have one name.
+    #[error("{}: columns {first} and {second} are both named `{name}`; every column wants a name of its own", path.display())]
+    DuplicateColumn {
+        /// The path as given.
+        path: PathBuf,
+        /// The name.
+        name: String,
+        /// Number of the first of the two, from 1.
+        first: usize,
+        /// Number of the second, from 1.
+        second: usize,
+    },
+    /// Columns are missing that this kind of run needs.
+    #[error("{}: {needed_for} needs {needed}; there are {present}", path.display())]
+    MissingColumns {
+        /// The path as given.
+        path: PathBuf,
+        /// The kind of run.
+        needed_for: &'static str,
+        /// What it needs.
+        needed: &'static str,
+        /// The columns that are there, unknown ones too.
+        present: String,
+    },
+    /// A cell is not a number, or a text not UTF-8.
+    #[error("{}: {place}, column {number} (`{column}`): {text:?} is not {wanted}", path.display())]
+    Cell {
+        /// The path as given.
+        path: PathBuf,
+        /// The row.
+        place: Place,
+        /// Number of the column, from 1.
+        number: usize,
+        /// Name of the column.
+        column: String,
+        /// The text of the cell, shortened.
+        text: String,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// A row has another number of fields than the header.
+    #[error("{}: {place} has {found} fields, the header has {expected}", path.display())]
+    FieldCount {
+        /// The path as given.
+        path: PathBuf,
+        /// The row.
+        place: Place,
+        /// Fields in the row.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// Quoting is not as RFC 4180 has it.
+    #[error("{}: line {line}: {what}", path.display())]
+    Quoting {
+        /// The path as given.
+        path: PathBuf,
+        /// Line in which the quoted field starts, from 1.
+        line: u64,
+        /// What is wrong, and what would be right.
+        what: &'static str,
+    },
+    /// A line goes on for longer than any row can be.
+    #[error("{}: line {line} does not end within {limit} bytes; wanted text with one row a line", path.display())]
+    EndlessLine {
+        /// The path as given.
+        path: PathBuf,
+        /// The line, from 1.
+        line: u64,
+        /// Bytes that were looked at.
+        limit: usize,
+    },
+    /// The time runs backwards.
+    #[error(
+        "{}: {place}: the time goes back from {before_s} s to {t_s} s; wanted `t_s` increasing (are two recordings in one file?)",
+        path.display()
+    )]
+    TimeBackwards {
+        /// The path as given.
+        path: PathBuf,
+        /// The row.
+        place: Place,
+        /// Time of the last good row before it, s.
+        before_s: f64,
+        /// Its time, s.
+        t_s: f64,
+    },
+    /// Every row was dropped.
+    #[error("{}: none of the {rows} rows can be used: {why}", path.display())]
+    NothingUsable {
+        /// The path as given.
+        path: PathBuf,
+        /// Rows that were read.
+        rows: u64,
+        /// What they lack.
+        why: String,
+    },
+    /// The settling time is as long as the run.
+    #[error(
+        "{}: nothing is left after {settle_s} s of settling, the recording lasts {duration_s} s; wanted a smaller `settle_s`",
+        path.display()
+    )]
+    NothingSettled {
+        /// The recording.
+        path: PathBuf,
+        /// Settling time, s.
+        settle_s: f64,
+        /// Time from the first to the last row, s.
+        duration_s: f64,
+    },
+    /// The Parquet file cannot be decoded.
+    #[error("{}: is not a Parquet file that can be read here: {what}", path.display())]
+    Parquet {
+        /// The path as given.
+        path: PathBuf,
+        /// What is wrong, and what would be right.
+        what: String,
+    },
+    /// The campaign file says something that it cannot mean.
+    #[error("{}: line {line}, column {column}: {what}; wanted {wanted}", path.display())]
+    Campaign {
+        /// The campaign file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, in characters, from 1.
+        column: usize,
+        /// What is wrong.
+        what: String,
+        /// What would be right.
+        wanted: String,
+    },
+}
+
+impl ReadError {
+    /// The error for a failed system call, with the two that have a plainer name told apart.
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
+        let path = path.to_path_buf();
+        match source.kind() {
+            io::ErrorKind::NotFound => Self::NotFound { path },
+            io::ErrorKind::IsADirectory => Self::Directory { path },
+            _ => Self::Io { path, source },
+        }
+    }
+}

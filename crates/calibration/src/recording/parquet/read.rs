@@ -1,0 +1,228 @@
+//! A Parquet file into a table: numbers of any common type as f64, nulls as missing, unknown columns as text.
+//!
+//! Nested columns and times of day are refused where a number is wanted, and left out with a warning where nothing is.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use parquet::basic::{Compression, LogicalType};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescPtr;
+
+use crate::recording::Recording;
+use crate::recording::admission;
+use crate::recording::channel::Channel;
+use crate::recording::error::{Place, ReadError};
+use crate::recording::layout::{Field, Layout};
+use crate::recording::table::{Missing, Places, Table};
+use crate::recording::unknown::Cells;
+
+const BATCH_ROWS: usize = 64 << 10;
+
+/// Reads a recording.
+pub(in crate::recording) fn read(file: File, source: &Path) -> Result<Recording, ReadError> {
+    // The decoder asserts what a damaged file does not hold.
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode(file, source)));
+    let damaged = |_| ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };
+    admission::admit(decoded.map_err(damaged)??, source)
+}
+
+fn decode(file: File, source: &Path) -> Result<Table, ReadError> {
+    let refuse = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
+    let reader = SerializedFileReader::new(file).map_err(|error| refuse(error.to_string()))?;
+    let descriptions = reader.metadata().file_metadata().schema_descr_ptr();
+    let mut warnings = vec![];
+    let mut kept: Vec<usize> = vec![];
+    let mut names: Vec<&str> = vec![];
+    for (at, description) in descriptions.columns().iter().enumerate() {
+        let name = description.path().parts().first().map_or("", String::as_str);
+        let is_channel = Channel::of(name).is_some();
+        match unreadable(description, is_channel) {
+            None => {
+                kept.push(at);
+                names.push(name);
+            }
+            Some(why) if is_channel => return Err(refuse(format!("column `{name}` {why}; wanted plain numbers"))),
+            Some(why) => warnings.push(format!("column `{}` {why} and is left out", description.path().string())),
+        }
+    }
+    let layout = Layout::new(&names, source)?;
+    let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
+    table.warnings = warnings;
+    refuse_codecs(&reader, &kept, source)?;
+
+    // One after the other: readers of one file share its position.
+    let columns: Vec<Column> = kept
+        .iter()
+        .zip(&layout.fields)
+        .map(|(&at, field)| read_column(&reader, at, *field))
+        .collect::<Result<_, ParquetError>>()
+        .map_err(|error| refuse(error.to_string()))?;
+    table.rows = columns.first().map_or(0, Column::len);
+    for (column, (field, name)) in columns.into_iter().zip(layout.fields.iter().zip(&layout.names)) {
+        if column.len() != table.rows {
+            let (found, rows) = (column.len(), table.rows);
+            return Err(refuse(format!("column `{name}` has {found} rows, the first column has {rows}")));
+        }
+        match (column, *field) {
+            (Column::Numbers(values, missing), Field::Number(at)) => {
+                (table.numbers[at].values, table.numbers[at].missing) = (values, missing);
+            }
+            (Column::Texts(cells), Field::Text(at)) => table.unknown[at].cells = cells,
+            _ => return Err(refuse(format!("column `{name}` changes its type"))),
+        }
+    }
+    Ok(table)
+}
+
+/// Why a column cannot be read, if it cannot.
+fn unreadable(description: &ColumnDescPtr, is_channel: bool) -> Option<String> {
+    use parquet::basic::Type;
+    if description.path().parts().len() > 1 || description.max_rep_level() > 0 {
+        return Some("is nested or repeated".to_owned());
+    }
+    let physical = description.physical_type();
+    let is_number = matches!(physical, Type::INT32 | Type::INT64 | Type::FLOAT | Type::DOUBLE);
+    match description.logical_type_ref() {
+        None | Some(LogicalType::Integer(_) | LogicalType::String) => {}
+        Some(other) => return Some(format!("is of the logical type {other:?}")),
+    }
+    let is_text = matches!(physical, Type::BYTE_ARRAY | Type::BOOLEAN);
+    let is_readable = is_number || (!is_channel && is_text);
+    (!is_readable).then(|| format!("is of the type {physical}"))
+}
+
+fn refuse_codecs(reader: &SerializedFileReader<File>, kept: &[usize], source: &Path) -> Result<(), ReadError> {
+    for group in reader.metadata().row_groups() {
+        for chunk in kept.iter().filter_map(|&at| group.columns().get(at)) {
+            let codec = chunk.compression();
+            if matches!(codec, Compression::ZSTD(_) | Compression::LZO) {
+                let name = chunk.column_path().string();
+                let what = format!(
+                    "column `{name}` is compressed with {codec}, which is not supported; \
+                     wanted no compression, SNAPPY, GZIP, LZ4, LZ4_RAW or BROTLI"
+                );
+                return Err(ReadError::Parquet { path: source.to_path_buf(), what });
+            }
+        }
+    }
+    Ok(())
+}
+
+enum Column {
+    Numbers(Vec<f64>, Missing),
+    Texts(Cells),
+}
+
+impl Column {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(values, _) => values.len(),
+            Self::Texts(cells) => cells.len(),
+        }
+    }
+
+    fn push_number(&mut self, value: Option<f64>) {
+        if let Self::Numbers(values, missing) = self {
+            let value = value.filter(|value| value.is_finite());
+            if value.is_none() {
+                missing.add(values.len());
+            }
+            values.push(value.unwrap_or(f64::NAN));
+        }
+    }
+}
+
+fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> Result<Column, ParquetError> {
+    let mut column = match field {
+        Field::Number(_) => Column::Numbers(vec![], Missing::default()),
+        Field::Text(_) => Column::Texts(Cells::default()),
+    };
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group)?;
+        let description = group.metadata().column(at).column_descr_ptr();
+        let is_unsigned = matches!(description.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
+        // Unsigned integers are stored in the bits of signed ones.
+        match group.get_column_reader(at)? {
+            ColumnReader::DoubleColumnReader(values) => each(values, &description, |v| add(&mut column, v.copied()))?,
+            ColumnReader::FloatColumnReader(values) => each(values, &description, |v| match &mut column {
+                Column::Numbers(..) => column.push_number(v.map(|&v| f64::from(v))),
+                Column::Texts(cells) => cells.push(&v.map(f32::to_string).unwrap_or_default()),
+            })?,
+            ColumnReader::Int32ColumnReader(values) => each(values, &description, |v| {
+                let value = v.map(|&v| if is_unsigned { i64::from(v.cast_unsigned()) } else { i64::from(v) });
+                add_integer(&mut column, value.map(i128::from));
+            })?,
+            ColumnReader::Int64ColumnReader(values) => each(values, &description, |v| {
+                let value = v.map(|&v| if is_unsigned { i128::from(v.cast_unsigned()) } else { i128::from(v) });
+                add_integer(&mut column, value);
+            })?,
+            ColumnReader::BoolColumnReader(values) => each(values, &description, |v| match &mut column {
+                Column::Texts(cells) => cells.push(&v.map(bool::to_string).unwrap_or_default()),
+                Column::Numbers(..) => column.push_number(None),
+            })?,
+            ColumnReader::ByteArrayColumnReader(values) => {
+                let mut refused = None;
+                each(values, &description, |v| match (&mut column, v.map(|v| std::str::from_utf8(v.data()))) {
+                    (Column::Texts(cells), None) => cells.push(""),
+                    (Column::Texts(cells), Some(Ok(text))) => cells.push(text),
+                    (Column::Texts(cells), Some(Err(_))) => {
+                        refused.get_or_insert(cells.len() + 1);
+                        cells.push("");
+                    }
+                    (Column::Numbers(..), _) => column.push_number(None),
+                })?;
+                if let Some(row) = refused {
+                    let name = description.name();
+                    return Err(ParquetError::General(format!("row {row}, column `{name}`: not text in UTF-8")));
+                }
+            }
+            _ => return Err(ParquetError::General(format!("column `{}` changes its type", description.name()))),
+        }
+    }
+    Ok(column)
+}
+
+fn add(column: &mut Column, value: Option<f64>) {
+    match column {
+        Column::Numbers(..) => column.push_number(value),
+        Column::Texts(cells) => cells.push(&value.as_ref().map(f64::to_string).unwrap_or_default()),
+    }
+}
+
+fn add_integer(column: &mut Column, value: Option<i128>) {
+    match column {
+        Column::Numbers(..) => column.push_number(value.map(|value| value as f64)),
+        Column::Texts(cells) => cells.push(&value.as_ref().map(i128::to_string).unwrap_or_default()),
+    }
+}
+
+/// Gives each value of a column, nulls as `None`.
+fn each<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    description: &ColumnDescPtr,
+    mut take: impl FnMut(Option<&T::T>),
+) -> Result<(), ParquetError> {
+    let present = description.max_def_level();
+    let (mut values, mut levels) = (vec![], vec![]);
+    loop {
+        values.clear();
+        levels.clear();
+        let (records, found, _) = reader.read_records(BATCH_ROWS, Some(&mut levels), None, &mut values)?;
+        if records == 0 {
+            return Ok(());
+        }
+        if present == 0 {
+            values.iter().take(found).for_each(|value| take(Some(value)));
+            continue;
+        }
+        let mut values = values.iter().take(found);
+        for &level in &levels {
+            take(if level == present { values.next() } else { None });
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! A recording as Parquet: numbers as nullable f64, NaN as null, unknown columns as text.
+//!
+//! One row group, Snappy. It has no options.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use parquet::basic::{Compression, LogicalType, Repetition, Type as PhysicalType};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::Type;
+
+use crate::recording::{Cells, Outlet, Recording};
+
+impl Recording {
+    /// Writes the recording as Parquet, in the order of its columns.
+    ///
+    /// # Errors
+    /// What the writer says, or [`io::ErrorKind::InvalidInput`] for a column without one value a row.
+    pub fn write_parquet(&self, writer: impl Write + Send) -> io::Result<()> {
+        let outlets = self.even_outlets()?;
+        write(&outlets, writer).map_err(io::Error::other)
+    }
+}
+
+fn write(outlets: &[(&str, Outlet<'_>)], writer: impl Write + Send) -> Result<(), ParquetError> {
+    let fields = outlets.iter().map(|(name, outlet)| field(name, outlet).map(Arc::new)).collect::<Result<_, _>>()?;
+    let schema = Arc::new(Type::group_type_builder("recording").with_fields(fields).build()?);
+    let properties = Arc::new(WriterProperties::builder().set_compression(Compression::SNAPPY).build());
+    let mut file = SerializedFileWriter::new(writer, schema, properties)?;
+    let mut group = file.next_row_group()?;
+    for (_, outlet) in outlets {
+        match outlet {
+            Outlet::Numbers(values) => write_numbers(&mut group, values)?,
+            Outlet::Texts(cells) => write_texts(&mut group, cells)?,
+        }
+    }
+    group.close()?;
+    file.close()?;
+    Ok(())
+}
+
+fn field(name: &str, outlet: &Outlet<'_>) -> Result<Type, ParquetError> {
+    match outlet {
+        Outlet::Numbers(_) => {
+            Type::primitive_type_builder(name, PhysicalType::DOUBLE).with_repetition(Repetition::OPTIONAL).build()
+        }
+        Outlet::Texts(_) => Type::primitive_type_builder(name, PhysicalType::BYTE_ARRAY)
+            .with_repetition(Repetition::REQUIRED)
+            .with_logical_type(Some(LogicalType::String))
+            .build(),
+    }
+}
+
+fn write_numbers<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    values: &[f64],
+) -> Result<(), ParquetError> {
+    let present: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let levels: Vec<i16> = values.iter().map(|value| i16::from(value.is_finite())).collect();
+    if let Some(mut column) = group.next_column()? {
+        column.typed::<DoubleType>().write_batch(&present, Some(&levels), None)?;
+        column.close()?;
+    }
+    Ok(())
+}
+
+fn write_texts<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    cells: &Cells,
+) -> Result<(), ParquetError> {
+    let texts: Vec<ByteArray> = cells.iter().map(ByteArray::from).collect();
+    if let Some(mut column) = group.next_column()? {
+        column.typed::<ByteArrayType>().write_batch(&texts, None, None)?;
+        column.close()?;
+    }
+    Ok(())
+}

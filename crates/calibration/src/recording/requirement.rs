@@ -1,0 +1,62 @@
+//! Which columns a run needs.
+//!
+//! Only presence is judged: whether the columns carry a rotation or a ring-down is the identification's to say.
+
+use super::Recording;
+use super::channel::Channel;
+use super::error::ReadError;
+
+const ANGLE: &str = "`t_s` and one of (`xc_v` with `yc_v`, `theta_deg`)";
+const ROTATION: &str = "`t_s`, one of (`rate_dps`, `table_deg`) and one of (`xc_v` with `yc_v`, `theta_deg`)";
+const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`";
+
+/// Whether a set of channels holds the time and an angle: the least that makes a recording.
+pub(super) fn holds_an_angle(has: impl Fn(Channel) -> bool) -> bool {
+    has(Channel::Time) && (has(Channel::Theta) || (has(Channel::Xc) && has(Channel::Yc)))
+}
+
+/// What `holds_an_angle` wants, in words.
+pub(super) const fn angle_in_words() -> &'static str {
+    ANGLE
+}
+
+impl Recording {
+    /// Whether the columns of a rotation run are there: `t_s`, one of (`rate_dps`, `table_deg`), and one of (`xc_v` with
+    /// `yc_v`, `theta_deg`).
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumns`] says what is needed and what is there.
+    pub fn require_rotation(&self) -> Result<(), ReadError> {
+        let has = |channel| self.channel(channel).is_some();
+        let whole = holds_an_angle(has) && (has(Channel::Rate) || has(Channel::Table));
+        self.require(whole, "a rotation", ROTATION)
+    }
+
+    /// Whether the columns of a ring-down are there: `t_s`, `xc_v`, `yc_v`, `vas_v`.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumns`] says what is needed and what is there.
+    pub fn require_ringdown(&self) -> Result<(), ReadError> {
+        let has = |channel| self.channel(channel).is_some();
+        let whole = has(Channel::Xc) && has(Channel::Yc) && has(Channel::Vas);
+        self.require(whole, "a ring-down", RINGDOWN)
+    }
+
+    fn require(&self, whole: bool, needed_for: &'static str, needed: &'static str) -> Result<(), ReadError> {
+        if whole {
+            return Ok(());
+        }
+        Err(ReadError::MissingColumns {
+            path: self.source.clone(),
+            needed_for,
+            needed,
+            present: in_words(self.column_names()),
+        })
+    }
+}
+
+/// Column names as a list to read.
+pub(super) fn in_words<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<String> = names.into_iter().map(|name| format!("`{}`", name.escape_debug())).collect();
+    if names.is_empty() { "no columns".to_owned() } else { names.join(", ") }
+}

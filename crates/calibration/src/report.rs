@@ -1,0 +1,159 @@
+//! The facts of an identification, as they are written to `report.json`. Nothing is rendered here.
+
+use serde::{Deserialize, Serialize};
+
+use crate::evaluate::ErrorSize;
+use crate::hypothesis::Origin;
+use crate::residual::Harmonic;
+
+/// Identifier of the report's format.
+pub const SCHEMA: &str = "cvg.report/1";
+
+/// A value with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// value
+    pub value: f64,
+    /// lower and upper end
+    pub ci95: [f64; 2],
+}
+
+impl Estimate {
+    /// A value and its standard deviation.
+    pub fn new(value: f64, deviation: f64) -> Self {
+        Self { value, ci95: [value - 1.96 * deviation, value + 1.96 * deviation] }
+    }
+
+    /// Half the width of the interval.
+    pub fn half_width(&self) -> f64 {
+        0.5 * (self.ci95[1] - self.ci95[0])
+    }
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterReport {
+    /// name
+    pub name: String,
+    /// unit
+    pub unit: String,
+    /// value
+    pub value: f64,
+    /// 95 % interval; null for a parameter set by a search
+    pub ci95: Option<[f64; 2]>,
+}
+
+/// Held-out rms of the angle error without and with an effect, deg.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BeforeAfter {
+    /// without the effect
+    pub before: f64,
+    /// with it
+    pub after: f64,
+}
+
+/// An effect that was identified.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectReport {
+    /// identifier in the effect library
+    pub id: String,
+    /// how it came in
+    pub origin: Origin,
+    /// its parameters
+    pub parameters: Vec<ParameterReport>,
+    /// what it does for the held-out error
+    pub heldout_rms_deg: Option<BeforeAfter>,
+    /// why it is believed
+    pub evidence: String,
+    /// effects that this campaign cannot tell from it
+    pub confounded_with: Vec<String>,
+    /// the extra run that would
+    pub separated_by: Option<String>,
+}
+
+/// Held-out angle errors at the three stages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Heldout {
+    /// before any compensation; null where the raw angle does not turn
+    pub raw: Option<ErrorSize>,
+    /// after the paper's compensation
+    pub declared: ErrorSize,
+    /// after all
+    pub discovered: ErrorSize,
+    /// the white part of the error, deg rms
+    pub noise_floor_deg: f64,
+}
+
+/// What is left after all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResidualReport {
+    /// its harmonics
+    pub harmonics: Vec<Harmonic>,
+    /// Ljung–Box finds no memory in it at 1 %
+    pub white: bool,
+}
+
+/// A feature of the residual that nothing explains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// pattern-harmonic, table-harmonic, rate-dependent, drift, time-periodic or other
+    pub class: String,
+    /// harmonic number
+    pub n: Option<u32>,
+    /// frequency, Hz
+    pub frequency_hz: Option<f64>,
+    /// size, deg rms
+    pub rms_deg: f64,
+    /// what could be done about it
+    pub suggestion: String,
+}
+
+/// A run of the campaign as it was used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunReport {
+    /// file
+    pub file: String,
+    /// rotation, or ring-down
+    pub kind: String,
+    /// fit, holdout or both
+    pub r#use: String,
+    /// rows read
+    pub rows: usize,
+    /// rows dropped on reading, by reason
+    pub dropped: Vec<String>,
+    /// mean input rate, deg/s
+    pub rate_dps: Option<f64>,
+    /// samples set aside as spikes
+    pub spikes: usize,
+    /// decay time constant, s
+    pub tau_s: Option<Estimate>,
+}
+
+/// The report.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`SCHEMA`]
+    pub schema: String,
+    /// name of the instrument
+    pub device: String,
+    /// gyroscope or sensor
+    pub instrument: String,
+    /// k
+    pub angular_gain: Estimate,
+    /// G_Dy/G_Dx; null where the campaign cannot tell
+    pub detection_gain_ratio: Option<Estimate>,
+    /// G_Ax/G_Ay; null where the campaign cannot tell
+    pub actuation_gain_ratio: Option<Estimate>,
+    /// identified effects
+    pub effects: Vec<EffectReport>,
+    /// held-out errors
+    pub heldout: Heldout,
+    /// what is left
+    pub residual: ResidualReport,
+    /// what is left and has no explanation
+    pub unexplained: Vec<Unexplained>,
+    /// the campaign's runs
+    pub runs: Vec<RunReport>,
+    /// what a reader must know
+    pub warnings: Vec<String>,
+}

@@ -1,0 +1,259 @@
+//! What is in a residual: harmonics of the pattern and of the table, lines in time, memory from sample to sample.
+
+use nalgebra::{DMatrix, DVector};
+use realfft::RealFftPlanner;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::evaluate::Evaluation;
+use crate::fit::Residual;
+use crate::statistics::median;
+
+/// What a harmonic follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Follows {
+    /// the pattern angle
+    Pattern,
+    /// the table angle
+    Table,
+}
+
+/// One harmonic of a residual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Harmonic {
+    /// what it follows
+    pub of: Follows,
+    /// harmonic number
+    pub n: u32,
+    /// amplitude, deg
+    pub amplitude_deg: f64,
+    /// half width of the 95 % interval of either quadrature component, deg
+    pub ci95_deg: f64,
+    /// phase of A cos(nθ + phase), deg
+    pub phase_deg: f64,
+}
+
+impl Residual {
+    /// The angle that a harmonic follows, per sample.
+    fn base(&self, of: Follows) -> &[f64] {
+        match of {
+            Follows::Pattern => &self.direction,
+            Follows::Table => &self.table,
+        }
+    }
+}
+
+/// Cross products of a residual with the two phases of one line.
+#[derive(Debug, Clone, Copy, Default)]
+struct Line {
+    cc: f64,
+    cs: f64,
+    ss: f64,
+    rc: f64,
+    rs: f64,
+}
+
+impl Line {
+    #[inline]
+    fn add(&mut self, residual: f64, sin: f64, cos: f64) {
+        self.cc += cos * cos;
+        self.cs += cos * sin;
+        self.ss += sin * sin;
+        self.rc += residual * cos;
+        self.rs += residual * sin;
+    }
+
+    /// What the line takes out of the sum of squares.
+    fn power(&self) -> f64 {
+        let determinant = self.cc * self.ss - self.cs * self.cs;
+        if determinant <= 1e-9 * (self.cc + self.ss).powi(2) {
+            return 0.0;
+        }
+        (self.rc * self.rc * self.ss - 2.0 * self.rc * self.rs * self.cs + self.rs * self.rs * self.cc) / determinant
+    }
+}
+
+/// Powers of the harmonics 1 to `most` of the pattern or the table, strongest first, as (n, power).
+pub(crate) fn strongest_harmonics(evaluation: &Evaluation, of: Follows, most: u32) -> Vec<(u32, f64)> {
+    let mut lines = vec![Line::default(); most as usize];
+    for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+        for i in (0..s.angle.len()).filter(|&i| kept[i]) {
+            // each harmonic from the one before, by the addition theorem
+            let (sin, cos) = s.base(of)[i].sin_cos();
+            let (mut sin_n, mut cos_n) = (sin, cos);
+            for line in &mut lines {
+                line.add(s.angle[i], sin_n, cos_n);
+                (sin_n, cos_n) = (sin_n * cos + cos_n * sin, cos_n * cos - sin_n * sin);
+            }
+        }
+    }
+    let mut powers: Vec<(u32, f64)> = (1..).zip(lines.iter().map(Line::power)).collect();
+    powers.sort_by(|a, b| b.1.total_cmp(&a.1));
+    powers
+}
+
+/// The highest harmonic of the table or pattern that the sampling resolves.
+pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u32) -> u32 {
+    let mut steps: Vec<f64> = evaluation
+        .segments
+        .iter()
+        .flat_map(|s| {
+            s.base(of).windows(2).take(2000).map(|w| crate::track::wrapped(w[1] - w[0], std::f64::consts::TAU).abs())
+        })
+        .filter(|d| *d > 1e-9)
+        .collect();
+    let step = median(&mut steps);
+    if step <= 0.0 {
+        return 0;
+    }
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and bounded by the limit")]
+    let resolved = (0.8 * std::f64::consts::PI / step).min(f64::from(limit)) as u32;
+    resolved
+}
+
+/// Samples of a segment that refine a frequency.
+const REFINED_SAMPLES: usize = 2_000;
+
+/// The strongest line in time, Hz, and its power; from the periodogram of every segment, refined over all.
+pub(crate) fn strongest_frequency(evaluation: &Evaluation) -> Option<(f64, f64)> {
+    const LARGEST: usize = 1 << 17;
+    let interval = {
+        let mut steps: Vec<f64> =
+            evaluation.segments.iter().flat_map(|s| s.t_s.windows(2).take(2000).map(|w| w[1] - w[0])).collect();
+        median(&mut steps)
+    };
+    let longest = evaluation.segments.iter().map(|s| s.angle.len().min(LARGEST)).max()?;
+    if longest < 32 || interval <= 0.0 {
+        return None;
+    }
+    let size = (2 * longest).next_power_of_two();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(size);
+    let mut power = vec![0.0; size / 2 + 1];
+    let mut spectrum = transform.make_output_vec();
+    for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+        let mut buffer = transform.make_input_vec();
+        for ((b, a), k) in buffer.iter_mut().zip(&s.angle).zip(kept) {
+            *b = if *k { *a } else { 0.0 };
+        }
+        transform.process(&mut buffer, &mut spectrum).ok()?;
+        let n = s.angle.len().max(1) as f64;
+        for (p, c) in power.iter_mut().zip(&spectrum) {
+            *p += c.norm_sqr() / n;
+        }
+    }
+    let df = 1.0 / (size as f64 * interval);
+    let lowest = (2.0 / (longest as f64 * interval) / df).ceil().max(1.0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive index")]
+    let from = lowest as usize;
+    let peak = (from..power.len().saturating_sub(1)).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+    // refine on the whole set with a common phase
+    let at = |f: f64| {
+        let mut line = Line::default();
+        for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+            let stride = (s.angle.len() / REFINED_SAMPLES).max(1);
+            for i in (0..s.angle.len()).step_by(stride).filter(|&i| kept[i]) {
+                let (sin, cos) = (std::f64::consts::TAU * f * s.t_s[i]).sin_cos();
+                line.add(s.angle[i] * (stride as f64).sqrt(), sin, cos);
+            }
+        }
+        line.power()
+    };
+    let mut best = (peak as f64 * df, at(peak as f64 * df));
+    let mut width = df;
+    for _ in 0..6 {
+        for k in -4..=4 {
+            let f = best.0 + 0.25 * f64::from(k) * width;
+            let p = if f > 0.0 { at(f) } else { 0.0 };
+            if p > best.1 {
+                best = (f, p);
+            }
+        }
+        width *= 0.4;
+    }
+    Some(best)
+}
+
+/// Amplitudes of harmonics 1 to `most`, fitted together, with 95 % intervals that allow for `inflation` of the variance
+/// by autocorrelation.
+pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflation: f64) -> Vec<Harmonic> {
+    let n = 2 * most as usize;
+    if n == 0 {
+        return Vec::new();
+    }
+    let (mut normal, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+    let (mut count, mut squares) = (0usize, 0.0);
+    let mut row = vec![0.0; n];
+    for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+        for i in (0..s.angle.len()).filter(|&i| kept[i]) {
+            for k in 0..most as usize {
+                let (sin, cos) = ((k + 1) as f64 * s.base(of)[i]).sin_cos();
+                row[2 * k] = cos;
+                row[2 * k + 1] = sin;
+            }
+            for a in 0..n {
+                for b in 0..=a {
+                    normal[(a, b)] += row[a] * row[b];
+                }
+                right[a] += row[a] * s.angle[i];
+            }
+            count += 1;
+            squares += s.angle[i] * s.angle[i];
+        }
+    }
+    normal.fill_upper_triangle_with_lower_triangle();
+    let Some(inverse) = normal.clone().cholesky().map(|c| c.inverse()) else { return Vec::new() };
+    let solution = &inverse * &right;
+    let rest = (squares - solution.dot(&right)).max(0.0) / (count.saturating_sub(n)).max(1) as f64;
+    (0..most)
+        .map(|k| {
+            let (c, s) = (solution[2 * k as usize], solution[2 * k as usize + 1]);
+            let variance =
+                inverse[(2 * k as usize, 2 * k as usize)].max(inverse[(2 * k as usize + 1, 2 * k as usize + 1)]);
+            Harmonic {
+                of,
+                n: k + 1,
+                amplitude_deg: c.hypot(s).to_degrees(),
+                ci95_deg: 1.96 * (variance * rest * inflation).sqrt().to_degrees(),
+                // c cos nθ + s sin nθ = A cos(nθ + phase) with c = A cos phase, s = −A sin phase
+                phase_deg: (-s).atan2(c).to_degrees(),
+            }
+        })
+        .collect()
+}
+
+/// Autocorrelation of the errors at lags 0 to `most`, pooled over segments.
+pub(crate) fn autocorrelation(evaluation: &Evaluation, most: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; most + 1];
+    for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+        for (lag, sum) in sums.iter_mut().enumerate() {
+            for i in lag..s.angle.len() {
+                if kept[i] && kept[i - lag] {
+                    *sum += s.angle[i] * s.angle[i - lag];
+                }
+            }
+        }
+    }
+    let zero = sums[0].max(f64::MIN_POSITIVE);
+    sums.into_iter().map(|s| s / zero).collect()
+}
+
+/// Lags of the whiteness test.
+pub(crate) const WHITENESS_LAGS: usize = 20;
+
+/// Ljung–Box: the probability of so much autocorrelation in `count` samples of white noise.
+pub(crate) fn ljung_box(correlation: &[f64], count: usize) -> f64 {
+    let n = count as f64;
+    let q: f64 = n
+        * (n + 2.0)
+        * correlation.iter().enumerate().skip(1).map(|(lag, r)| r * r / (n - lag as f64).max(1.0)).sum::<f64>();
+    ChiSquared::new((correlation.len() - 1).max(1) as f64).map_or(0.0, |d| d.sf(q))
+}
+
+/// By how much autocorrelation inflates the variance of a slowly varying estimate: 1 + 2Σρ over the leading positive
+/// lags, at least 1.
+pub(crate) fn inflation(correlation: &[f64], count: usize) -> f64 {
+    let band = 1.96 / (count.max(1) as f64).sqrt();
+    1.0 + 2.0 * correlation.iter().skip(1).take_while(|r| **r > band).sum::<f64>()
+}

@@ -1,0 +1,245 @@
+//! Where a fit starts: the ellipse of a sensor whose offsets hide the angle, and the motion of each run.
+//!
+//! From here on residuals are small against the period, so no angle is ever unwrapped against its neighbour again.
+
+use cvg_model::effects::{EffectId, Moment};
+use nalgebra::{Matrix5, Vector5};
+
+use crate::error::Refusal;
+use crate::hypothesis::{Hypothesis, Origin};
+use crate::pass::Start;
+use crate::recording::Instrument;
+use crate::statistics::{circular_mean, line, median, robust_deviation};
+use crate::track::{Track, wrapped};
+
+/// An ellipse through the readout of all tracks, as offsets, skew and gain ratio of a circle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ellipse {
+    pub(crate) offset: [f64; 2],
+    pub(crate) skew: f64,
+    pub(crate) gain_ratio: f64,
+    /// radius of the circle behind it, V
+    pub(crate) radius: f64,
+}
+
+/// Samples that an ellipse needs no more of.
+const ENOUGH: usize = 20_000;
+
+impl Ellipse {
+    /// The conic of least algebraic distance through all readouts, refitted without its outliers.
+    pub(crate) fn through(tracks: &[Track]) -> Option<Self> {
+        let points: Vec<(f64, f64)> = tracks
+            .iter()
+            .flat_map(|t| {
+                let stride = (t.t_s.len() / ENOUGH).max(1);
+                t.segments.iter().flat_map(move |s| s.range.clone().step_by(stride)).map(|i| {
+                    let e = t.envelope(i);
+                    (e.x_c, e.y_c)
+                })
+            })
+            .collect();
+        let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+        let centre = (median(&mut xs), median(&mut ys));
+        let scale = robust_deviation(points.iter().map(|p| (p.0 - centre.0).hypot(p.1 - centre.1)));
+        let local: Vec<(f64, f64)> =
+            points.iter().map(|p| ((p.0 - centre.0) / scale, (p.1 - centre.1) / scale)).collect();
+        let mut kept: Vec<(f64, f64)> = local.iter().copied().filter(|p| p.0.hypot(p.1) < 6.0).collect();
+        let mut conic = Vector5::zeros();
+        for _ in 0..3 {
+            conic = fit_conic(&kept)?;
+            let distance = |p: &(f64, f64)| terms(p).dot(&conic) - 1.0;
+            let spread = robust_deviation(local.iter().map(distance)).max(1e-9);
+            kept = local.iter().copied().filter(|p| distance(p).abs() < 6.0 * spread).collect();
+        }
+        let [a, b, c, d, e] = [conic[0], conic[1], conic[2], conic[3], conic[4]];
+        let determinant = 4.0 * a * c - b * b;
+        if determinant <= 0.0 {
+            return None;
+        }
+        let (x0, y0) = ((b * e - 2.0 * c * d) / determinant, (b * d - 2.0 * a * e) / determinant);
+        // x = A cos θ, y = g(A sin θ + s A cos θ): a x² + b xy + c y² with c = k/g², b = −2ks/g, a = k(1 + s²)
+        let skew_in_gain = -b / (2.0 * c);
+        let gain_ratio = ((a - b * b / (4.0 * c)) / c).sqrt();
+        // a x₀² + b x₀y₀ + c y₀² = 1 + (value at the centre) scales the radius: k A² = 1 + k(x₀² + …)
+        let centre_value = a * x0 * x0 + b * x0 * y0 + c * y0 * y0;
+        let k = a - b * b / (4.0 * c);
+        Some(Self {
+            radius: scale * ((1.0 + centre_value) / k).sqrt(),
+            offset: [centre.0 + scale * x0, centre.1 + scale * y0],
+            skew: skew_in_gain / gain_ratio,
+            gain_ratio,
+        })
+    }
+
+    /// Whether the raw readout circles the origin, so that its angle turns.
+    pub(crate) fn contains_origin(&self) -> bool {
+        let x = -self.offset[0];
+        let y = -self.offset[1] / self.gain_ratio - self.skew * x;
+        x.hypot(y) < self.radius
+    }
+
+    /// Puts the ellipse into a hypothesis.
+    pub(crate) fn install(&self, hypothesis: &mut Hypothesis) {
+        let mut put = |id, origin, values: &[f64]| {
+            let at = hypothesis.admit(id, origin);
+            hypothesis.members[at].values[..values.len()].copy_from_slice(values);
+        };
+        put(EffectId::DetectionOffset, Origin::Discovered, &self.offset);
+        put(EffectId::DetectionSkew, Origin::Discovered, &[self.skew]);
+        put(EffectId::DetectionGainMismatch, Origin::Declared, &[self.gain_ratio]);
+    }
+}
+
+fn terms(p: &(f64, f64)) -> Vector5<f64> {
+    Vector5::new(p.0 * p.0, p.0 * p.1, p.1 * p.1, p.0, p.1)
+}
+
+fn fit_conic(points: &[(f64, f64)]) -> Option<Vector5<f64>> {
+    if points.len() < 8 {
+        return None;
+    }
+    let (mut normal, mut right) = (Matrix5::zeros(), Vector5::zeros());
+    for p in points {
+        let t = terms(p);
+        normal += t * t.transpose();
+        right += t;
+    }
+    normal.cholesky().map(|c| c.solve(&right))
+}
+
+/// The motion of a track under a hypothesis: its angular gain, and where its segments start.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Motion {
+    pub(crate) angular_gain: f64,
+    pub(crate) starts: Vec<Start>,
+    /// robust deviation of the angle from the line, rad
+    pub(crate) deviation: f64,
+    /// pattern angle covered, rad
+    pub(crate) travel: f64,
+}
+
+/// Finds the motion of a track: tries the given angular gain, ± 1 for a sensor, and what neighbouring samples say, and
+/// keeps what leaves least.
+pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, given: Option<f64>) -> Result<Motion, Refusal> {
+    let bearings: Vec<Vec<f64>> = track
+        .segments
+        .iter()
+        .map(|s| {
+            s.range
+                .clone()
+                .step_by(track.stride)
+                .map(|i| {
+                    let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: 0.0 };
+                    hypothesis.bearing(&hypothesis.unread(track.envelope(i), &at))
+                })
+                .collect()
+        })
+        .collect();
+    let mut guesses: Vec<f64> = given.into_iter().collect();
+    guesses.extend(neighbours(track, hypothesis, &bearings));
+    if hypothesis.instrument == Instrument::Sensor {
+        guesses.extend([1.0, -1.0]);
+    }
+    let motion = guesses
+        .into_iter()
+        .filter(|g| g.is_finite() && *g != 0.0)
+        .map(|g| follow(track, hypothesis, &bearings, g))
+        .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+        .ok_or_else(|| {
+            Refusal::new(
+                &track.name,
+                "the angle does not follow the input at all",
+                "angular_gain in the campaign, or finer sampling",
+            )
+        })?;
+    Ok(motion)
+}
+
+/// Median ln of the amplitude over a segment.
+fn mean_ln_amplitude(track: &Track, segment: &crate::track::Segment, hypothesis: &Hypothesis) -> f64 {
+    let stride = (segment.range.len() / 1000).max(1);
+    let mut values: Vec<f64> = segment
+        .range
+        .clone()
+        .step_by(stride)
+        .map(|i| {
+            let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: 0.0 };
+            0.5 * hypothesis.unread(track.envelope(i), &at).pendulum().e.ln()
+        })
+        .collect();
+    median(&mut values)
+}
+
+/// Angular gain from steps between neighbouring samples.
+fn neighbours(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>]) -> Option<f64> {
+    let mut steps = Vec::new();
+    for (segment, bearing) in track.segments.iter().zip(bearings) {
+        for (n, w) in bearing.windows(2).enumerate().take(ENOUGH) {
+            let i = segment.range.start + n * track.stride;
+            let input = track.input_rad[i + track.stride] - track.input_rad[i];
+            if input.abs() > 1e-6 {
+                steps.push(wrapped(w[1] - w[0], hypothesis.period_rad) / input);
+            }
+        }
+    }
+    (steps.len() >= 8).then(|| hypothesis.sense() * median(&mut steps))
+}
+
+/// Follows the angle along a guessed gain: each sample is taken nearest to the median of the last few.
+fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: f64) -> Motion {
+    const MEMORY: usize = 5;
+    let sense = hypothesis.sense();
+    let mut gains = Vec::new();
+    let mut followed: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+    for (segment, bearing) in track.segments.iter().zip(bearings) {
+        let zero = track.input_rad[segment.range.start];
+        let turned: Vec<f64> = segment.range.clone().step_by(track.stride).map(|i| track.input_rad[i] - zero).collect();
+        let mut recent = [0.0; MEMORY];
+        let mut rest: Vec<f64> = Vec::with_capacity(turned.len());
+        for (n, (b, a)) in bearing.iter().zip(&turned).enumerate() {
+            let raw = b - sense * guess * a;
+            let near = if n == 0 {
+                raw
+            } else {
+                let mut few = recent;
+                median(&mut few[..n.min(MEMORY)])
+            };
+            let value = near + wrapped(raw - near, hypothesis.period_rad);
+            recent[n % MEMORY] = value;
+            rest.push(value);
+        }
+        // a line through the rest, once more without its outliers
+        let (mut slope, mut intercept) = line(&turned, &rest);
+        for _ in 0..3 {
+            let off = |(a, r): (&f64, &f64)| r - slope * a - intercept;
+            let limit = 4.0 * robust_deviation(turned.iter().zip(&rest).map(off)) + 1e-9;
+            let (x, y): (Vec<f64>, Vec<f64>) =
+                turned.iter().zip(&rest).filter(|p| off(*p).abs() < limit).map(|(a, r)| (*a, *r)).unzip();
+            (slope, intercept) = line(&x, &y);
+        }
+        let weight: f64 = turned.iter().map(|a| a * a).sum();
+        gains.push((guess + sense * slope, weight));
+        followed.push((turned, rest));
+    }
+    let weight: f64 = gains.iter().map(|g| g.1).sum();
+    let gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight.max(f64::MIN_POSITIVE);
+    let mut off = Vec::new();
+    let starts = followed
+        .iter()
+        .map(|(turned, rest)| {
+            let after: Vec<f64> = turned.iter().zip(rest).map(|(a, r)| r - sense * (gain - guess) * a).collect();
+            let angle = circular_mean(after.iter().copied(), hypothesis.period_rad);
+            off.extend(after.iter().map(|r| wrapped(r - angle, hypothesis.period_rad)));
+            Start { angle, amplitude: 0.0 }
+        })
+        .zip(&track.segments)
+        .map(|(start, segment)| Start { amplitude: mean_ln_amplitude(track, segment, hypothesis), ..start })
+        .collect();
+    let (lo, hi) = track
+        .segments
+        .iter()
+        .flat_map(|s| s.range.clone())
+        .map(|i| gain * track.input_rad[i])
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    Motion { angular_gain: gain, starts, deviation: robust_deviation(off.into_iter()), travel: hi - lo }
+}

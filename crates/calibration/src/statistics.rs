@@ -1,0 +1,54 @@
+//! Robust statistics of residuals that are mostly noise and partly spikes.
+
+/// Ratio of standard deviation to median absolute deviation of a normal distribution.
+const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
+
+/// Median; 0 of nothing. Reorders its argument.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Standard deviation about zero, from the median absolute value: spikes do not count.
+pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let mut magnitudes: Vec<f64> = values.map(f64::abs).filter(|v| v.is_finite()).collect();
+    SIGMA_PER_MAD * median(&mut magnitudes)
+}
+
+/// Standard deviation of the white part of a smooth series, from third differences: what varies over many samples
+/// does not count, spikes do not either.
+pub(crate) fn white_noise(series: &[f64]) -> f64 {
+    // the third difference (1, −3, 3, −1) of white noise has 20 times its variance
+    robust_deviation(series.windows(4).map(|w| w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3])) / 20f64.sqrt()
+}
+
+/// Slope and intercept of the least-squares line.
+pub(crate) fn line(x: &[f64], y: &[f64]) -> (f64, f64) {
+    let n = x.len().min(y.len()) as f64;
+    if n < 1.0 {
+        return (0.0, 0.0);
+    }
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let (mut sxx, mut sxy) = (0.0, 0.0);
+    for (a, b) in x.iter().zip(y) {
+        sxx += (a - mx) * (a - mx);
+        sxy += (a - mx) * (b - my);
+    }
+    let slope = if sxx > 0.0 { sxy / sxx } else { 0.0 };
+    (slope, my - slope * mx)
+}
+
+/// Mean direction of angles of a period.
+pub(crate) fn circular_mean(angles: impl Iterator<Item = f64>, period: f64) -> f64 {
+    let k = std::f64::consts::TAU / period;
+    let (mut s, mut c) = (0.0, 0.0);
+    for a in angles {
+        let (sin, cos) = (k * a).sin_cos();
+        s += sin;
+        c += cos;
+    }
+    s.atan2(c) / k
+}

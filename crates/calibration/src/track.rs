@@ -1,0 +1,265 @@
+//! A rotation run made ready: the input angle it turned through, the envelope it read, the commands it gave.
+//!
+//! Everything here is taken from the recording without a model of the instrument; spikes are still in it.
+
+use std::ops::Range;
+
+use cvg_model::{ControlOutputs, Envelope};
+
+use crate::error::Refusal;
+use crate::hypothesis::Commands;
+use crate::recording::{Recording, Role, Run};
+
+/// A rotation run, ready for a fit.
+#[derive(Debug)]
+pub(crate) struct Track {
+    /// name of the run, for messages
+    pub(crate) name: String,
+    /// time of the recording, s
+    pub(crate) t_s: Vec<f64>,
+    /// input angle, rad, 0 where the table's own angle starts
+    pub(crate) input_rad: Vec<f64>,
+    /// stretches without a gap, and what each is for
+    pub(crate) segments: Vec<Segment>,
+    /// every how many samples a fit looks at: more than one only in runs of more than [`ENOUGH_SAMPLES`]
+    pub(crate) stride: usize,
+    source: Source,
+    commands: Option<[Vec<f64>; 2]>,
+}
+
+/// A stretch of a track without a gap: it has one bias.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Segment {
+    /// samples
+    pub(crate) range: Range<usize>,
+    /// fit or held out
+    pub(crate) role: Role,
+}
+
+/// Where the envelope comes from.
+#[derive(Debug)]
+enum Source {
+    /// demodulated channels x_c, y_c and, if recorded, x_s, y_s
+    Channels { in_phase: [Vec<f64>; 2], quadrature: Option<[Vec<f64>; 2]> },
+    /// the instrument's own angle, unwrapped, rad, at a nominal amplitude
+    Angle { theta_rad: Vec<f64>, amplitude: f64 },
+}
+
+/// A gap longer than this many sampling intervals ends a segment.
+const GAP_INTERVALS: f64 = 20.0;
+/// Share of a run, in time, that is held out where no run is: the last quarter.
+const FITTED_SHARE: f64 = 0.75;
+/// Samples of one run beyond which more would not narrow an interval that still means something; longer runs are
+/// looked at evenly thinned, as far as the pattern turns little from sample to sample.
+const ENOUGH_SAMPLES: usize = 100_000;
+/// Largest turn of the table between the samples of a thinned run, rad.
+const LARGEST_THINNED_TURN: f64 = 0.3;
+/// A segment needs this many samples to carry a bias of its own.
+const SHORTEST_SEGMENT: usize = 16;
+
+impl Track {
+    /// Prepares a rotation run. `period_rad` is the period of the instrument's angle; `split` holds out the last quarter.
+    ///
+    /// # Errors
+    /// Where the run does not turn, or nothing is left of it.
+    pub(crate) fn new(run: Run, period_rad: f64, split: bool) -> Result<Self, Refusal> {
+        let name = run_name(&run);
+        let (settled, role) = (run.settled()?, run.role);
+        let mut track = Self::whole(run, period_rad)?;
+        if spread(&track.input_rad) < 1e-9 {
+            return Err(Refusal::new(
+                &name,
+                "column rate_dps or table_deg: the table does not turn in a rotation run",
+                "a rate other than zero",
+            ));
+        }
+        track.segments = segments(&track.t_s, settled, role, split);
+        if track.segments.is_empty() {
+            return Err(Refusal::new(&name, "too few samples are left after settling", "a longer run"));
+        }
+        let turn = track.mean_rate().abs() * (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / track.t_s.len() as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
+        let resolved = (LARGEST_THINNED_TURN / turn.max(1e-12)) as usize;
+        track.stride = (track.t_s.len() / ENOUGH_SAMPLES).min(resolved).max(1);
+        Ok(track)
+    }
+
+    /// A rotation run as one segment from its first sample to its last.
+    ///
+    /// # Errors
+    /// Where there is no angle.
+    pub(crate) fn whole(run: Run, period_rad: f64) -> Result<Self, Refusal> {
+        let name = crate::track::run_name(&run);
+        let role = run.role;
+        let amplitude = run.amplitude;
+        let mut recording = run.recording;
+        let input_rad = input_angle(&mut recording);
+        let source = match (recording.xc_v.take(), recording.yc_v.take(), recording.theta_deg.take()) {
+            (Some(x), Some(y), _) => Source::Channels {
+                in_phase: [x, y],
+                quadrature: recording.xs_v.take().zip(recording.ys_v.take()).map(|(x, y)| [x, y]),
+            },
+            (_, _, Some(theta)) => {
+                Source::Angle { theta_rad: unwrapped(&theta, period_rad), amplitude: amplitude.unwrap_or(1.0) }
+            }
+            _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
+        };
+        let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [held(a), held(q)]);
+        let segments = vec![Segment { range: 0..recording.t_s.len(), role }];
+        Ok(Self { name, t_s: recording.t_s, input_rad, segments, stride: 1, source, commands })
+    }
+
+    /// The envelope as the electronics saw it, V (or at nominal amplitude, where only an angle was recorded).
+    #[inline]
+    pub(crate) fn envelope(&self, i: usize) -> Envelope<f64> {
+        match &self.source {
+            Source::Channels { in_phase: [x, y], quadrature: Some([xs, ys]) } => {
+                Envelope::new(x[i], xs[i], y[i], ys[i])
+            }
+            Source::Channels { in_phase: [x, y], quadrature: None } => Envelope::new(x[i], 0.0, y[i], 0.0),
+            Source::Angle { theta_rad, amplitude } => {
+                let (sin, cos) = theta_rad[i].sin_cos();
+                Envelope::new(amplitude * cos, 0.0, amplitude * sin, 0.0)
+            }
+        }
+    }
+
+    /// The controllers' outputs at sample `i`, averaged over the `width` samples around it: what a sum over thinned
+    /// samples has to count.
+    #[inline]
+    pub(crate) fn commands(&self, i: usize, width: usize) -> Option<Commands> {
+        let [v_as, v_qc] = self.commands.as_ref()?;
+        let last = v_as.len() - 1;
+        let range = i.saturating_sub(width / 2)..(i + width.div_ceil(2)).min(last + 1);
+        let mean = |v: &[f64]| v[range.clone()].iter().sum::<f64>() / range.len() as f64;
+        let (from, to) = (i.saturating_sub(width), (i + width).min(last));
+        let interval = self.t_s[to] - self.t_s[from];
+        let change = |v: &[f64]| if interval > 0.0 { (v[to] - v[from]) / interval } else { 0.0 };
+        Some(Commands {
+            now: ControlOutputs { v_as: mean(v_as), v_qc: mean(v_qc) },
+            change_per_s: ControlOutputs { v_as: change(v_as), v_qc: change(v_qc) },
+        })
+    }
+
+    /// Commands were recorded.
+    pub(crate) fn has_commands(&self) -> bool {
+        self.commands.is_some()
+    }
+
+    /// Quadrature channels were recorded.
+    pub(crate) fn has_quadrature(&self) -> bool {
+        matches!(self.source, Source::Channels { quadrature: Some(_), .. })
+    }
+
+    /// The readout's amplitude was recorded, not only an angle.
+    pub(crate) fn has_amplitude(&self) -> bool {
+        matches!(self.source, Source::Channels { .. })
+    }
+
+    /// Input rate around sample `i`, rad/s.
+    #[inline]
+    pub(crate) fn rate(&self, i: usize) -> f64 {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(self.t_s.len() - 1));
+        (self.input_rad[b] - self.input_rad[a]) / (self.t_s[b] - self.t_s[a])
+    }
+
+    /// Samples of all segments of a role.
+    pub(crate) fn samples(&self, role: Role) -> usize {
+        self.segments.iter().filter(|s| s.role == role).map(|s| s.range.len()).sum()
+    }
+
+    /// Mean input rate over the settled run, rad/s.
+    pub(crate) fn mean_rate(&self) -> f64 {
+        match (self.segments.first(), self.segments.last()) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (a.range.start, b.range.end - 1);
+                (self.input_rad[b] - self.input_rad[a]) / (self.t_s[b] - self.t_s[a])
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// max − min
+fn spread(values: &[f64]) -> f64 {
+    let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    hi - lo
+}
+
+/// The input angle in rad: the table's own, unwrapped, or the rate integrated.
+fn input_angle(recording: &mut Recording) -> Vec<f64> {
+    if let Some(table) = recording.table_deg.take() {
+        return unwrapped(&table, std::f64::consts::TAU);
+    }
+    let rate = recording.rate_dps.take().unwrap_or_default();
+    let t = &recording.t_s;
+    let mut angle = 0.0;
+    let mut out = Vec::with_capacity(t.len());
+    for i in 0..rate.len().min(t.len()) {
+        if i > 0 {
+            angle += 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]);
+        }
+        out.push(angle);
+    }
+    out
+}
+
+/// An angle in degrees of any wrapping as a continuous one in rad: each step is the shortest of the period.
+fn unwrapped(degrees: &[f64], period_rad: f64) -> Vec<f64> {
+    let mut out: Vec<f64> = Vec::with_capacity(degrees.len());
+    for d in degrees {
+        let raw = d.to_radians();
+        let last = out.last().copied().unwrap_or(raw);
+        out.push(last + wrapped(raw - last, period_rad));
+    }
+    out
+}
+
+/// The representative of `angle` in [−period/2, period/2].
+#[inline]
+pub(crate) fn wrapped(angle: f64, period: f64) -> f64 {
+    angle - period * (angle / period).round()
+}
+
+/// Missing commands take the value that was last given, as a held output does.
+fn held(mut values: Vec<f64>) -> Vec<f64> {
+    let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+    for v in &mut values {
+        if v.is_finite() {
+            last = *v;
+        } else {
+            *v = last;
+        }
+    }
+    values
+}
+
+/// Cuts a run at its gaps and, where `split` is set, at the start of its held-out quarter.
+fn segments(t: &[f64], settled: Range<usize>, role: Role, split: bool) -> Vec<Segment> {
+    let mut steps: Vec<f64> = settled.clone().skip(1).map(|i| t[i] - t[i - 1]).collect();
+    if steps.is_empty() {
+        return Vec::new();
+    }
+    let middle = steps.len() / 2;
+    let (_, &mut interval, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let cut = t[settled.start] + FITTED_SHARE * (t[settled.end - 1] - t[settled.start]);
+    let mut out = Vec::new();
+    let mut start = settled.start;
+    for i in settled.clone().skip(1).chain([settled.end]) {
+        let ends =
+            i == settled.end || t[i] - t[i - 1] > GAP_INTERVALS * interval || (split && t[i - 1] < cut && t[i] >= cut);
+        if ends {
+            let role = if split && t[start] >= cut { Role::Holdout } else { role };
+            if i - start >= SHORTEST_SEGMENT {
+                out.push(Segment { range: start..i, role });
+            }
+            start = i;
+        }
+    }
+    out
+}
+
+/// A run's file, for messages.
+pub(crate) fn run_name(run: &Run) -> String {
+    run.recording.source.display().to_string()
+}

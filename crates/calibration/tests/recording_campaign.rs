@@ -1,0 +1,194 @@
+//! Campaign files: what they say is read, and what they cannot mean is refused with its line.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::recording::{Campaign, Instrument, Role, RunKind};
+use tempfile::TempDir;
+
+const ROTATION: &str = "t_s,rate_dps,xc_v,yc_v\n0,500,1,0\n0.5,500,0.9,0.1\n1,500,0.8,0.2\n1.5,500,0.7,0.3\n";
+const RINGDOWN: &str = "t_s,xc_v,yc_v,vas_v\n0,1,0,-0.1\n1,1,0,-0.1\n2,0.9,0,0\n";
+const RUN: &str = "[[run]]\nkind = \"rotation\"\nfile = \"rot.csv\"\n";
+
+/// A folder with a rotation, a ring-down and this campaign file.
+fn campaign(text: &str) -> (TempDir, PathBuf) {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("rot.csv"), ROTATION).unwrap();
+    fs::write(folder.path().join("ring.csv"), RINGDOWN).unwrap();
+    let path = folder.path().join("campaign.toml");
+    fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+fn refusal(text: &str) -> String {
+    let (_folder, path) = campaign(text);
+    Campaign::open(&path).expect_err("the campaign is refused").to_string()
+}
+
+fn assert_refused(text: &str, parts: &[&str]) {
+    let message = refusal(text);
+    for part in parts {
+        assert!(message.contains(part), "{part:?} in {message:?}");
+    }
+}
+
+fn headed(runs: &str) -> String {
+    format!("[campaign]\ndevice = \"dfp-7\"\n{runs}")
+}
+
+#[test]
+fn a_whole_campaign_is_read_as_it_is_written() {
+    let (folder, path) = campaign(
+        "[campaign]\ndevice = \"dfp-7\"\ninstrument = \"gyroscope\"\ncarrier_hz = 15_200.0\nangular_gain = 0.78\n\
+         period_deg = 180\n\n[[run]]\nkind = \"rotation\"\nfile = \"rot.csv\"\nsettle_s = 1.0\nuse = \"holdout\"\n\
+         amplitude = 0.6\n\n[[run]]\nkind = \"rotation\"\nfile = \"rot.csv\"\n\n\
+         [[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\nangle_deg = 90\nenergy_off_s = 1.5\n",
+    );
+    let campaign = Campaign::open(&path).unwrap();
+    assert_eq!((campaign.device.as_str(), campaign.instrument), ("dfp-7", Instrument::Gyroscope));
+    let numbers = [campaign.carrier_hz, campaign.angular_gain, campaign.period_deg];
+    assert_eq!(numbers, [Some(15_200.0), Some(0.78), Some(180.0)]);
+    let [holdout, fit, ringdown] = &campaign.runs[..] else { panic!("three runs") };
+    assert_eq!((holdout.kind, holdout.role, holdout.amplitude), (RunKind::Rotation, Role::Holdout, Some(0.6)));
+    assert_eq!((fit.role, fit.settle_s, fit.amplitude), (Role::Fit, 0.0, None));
+    assert_eq!(ringdown.kind, RunKind::Ringdown { angle_deg: 90.0, energy_off_s: 1.5 });
+    assert_eq!(ringdown.recording.source, folder.path().join("ring.csv"));
+    assert_eq!(ringdown.file, Path::new("ring.csv"));
+    assert!(campaign.warnings[0].contains("`rot.csv` is named by more than one run"), "{:?}", campaign.warnings);
+}
+
+#[test]
+fn a_campaign_written_and_read_again_says_the_same() {
+    let (folder, path) = campaign(&headed(&format!(
+        "instrument = \"gyroscope\"\nangular_gain = -1\n{RUN}settle_s = 0.5\namplitude = 0.25\n\
+         [[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\nangle_deg = -45.5\nenergy_off_s = 1\nuse = \"holdout\"\n"
+    )));
+    let first = Campaign::open(&path).unwrap();
+    let again_path = folder.path().join("again.toml");
+    fs::write(&again_path, first.to_toml()).unwrap();
+    let again = Campaign::open(&again_path).unwrap();
+    assert_eq!(again.to_toml(), first.to_toml());
+    assert_eq!(
+        (again.angular_gain, again.runs[0].amplitude, again.runs[1].role),
+        (Some(-1.0), Some(0.25), Role::Holdout)
+    );
+}
+
+#[test]
+fn a_single_recording_is_a_campaign_of_one_rotation() {
+    let (folder, _) = campaign("");
+    let campaign = Campaign::open(&folder.path().join("rot.csv")).unwrap();
+    assert_eq!((campaign.device.as_str(), campaign.runs.len()), ("rot", 1));
+    assert_eq!((campaign.runs[0].kind, campaign.runs[0].role), (RunKind::Rotation, Role::Fit));
+    let message = Campaign::open(&folder.path().join("ring.csv")).unwrap_err().to_string();
+    assert!(message.contains("a rotation needs"), "{message}");
+}
+
+#[test]
+fn settling_leaves_the_rows_from_its_time_on() {
+    let (_folder, path) = campaign(&headed(&format!("{RUN}settle_s = 1\n")));
+    assert_eq!(Campaign::open(&path).unwrap().runs[0].settled().unwrap(), 2..4);
+    assert_refused(
+        &headed(&format!("{RUN}settle_s = 2\n")),
+        &["rot.csv", "nothing is left after 2 s of settling, the recording lasts 1.5 s"],
+    );
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named_with_the_line_that_names_it() {
+    let text = headed("[[run]]\nkind = \"rotation\"\nfile = \"lost.csv\"\n");
+    assert_refused(&text, &["campaign.toml: line 5, column 8", "`lost.csv` of this run is not there"]);
+    let text = headed("[[run]]\nkind = \"rotation\"\nfile = \".\"\n");
+    assert_refused(&text, &["line 5, column 8", "is a directory"]);
+}
+
+#[test]
+fn unknown_keys_are_refused_with_the_known_ones() {
+    let text = headed(&format!("{RUN}settle = 1\n"));
+    assert_refused(&text, &["line 6, column 1", "the key `settle` has no meaning in a rotation run", "`settle_s`"]);
+    assert_refused(&headed(&format!("carrier = 1\n{RUN}")), &["line 3", "`carrier`", "`carrier_hz`"]);
+    assert_refused(&format!("{}[extra]\n", headed(RUN)), &["line 6", "`extra`", "one of `campaign`, `run`"]);
+    assert_refused(&headed(&format!("{RUN}angle_deg = 1\n")), &["`angle_deg` has no meaning in a rotation run"]);
+}
+
+#[test]
+fn values_out_of_range_are_refused_with_what_would_be_right() {
+    for (line, wanted) in [
+        ("settle_s = -1", "0 or more seconds"),
+        ("settle_s = \"1\"", "0 or more seconds"),
+        ("settle_s = nan", "0 or more seconds"),
+        ("amplitude = 0", "a positive relative amplitude"),
+        ("use = \"test\"", "\"fit\" or \"holdout\""),
+    ] {
+        assert_refused(&headed(&format!("{RUN}{line}\n")), &["line 6", line.split(' ').next().unwrap(), wanted]);
+    }
+    for (line, wanted) in [
+        ("period_deg = 90", "180 or 360"),
+        ("carrier_hz = -1.0", "a positive number of Hz"),
+        ("angular_gain = 0.0", "a number other than 0"),
+        ("instrument = \"gyro\"", "\"gyroscope\" or \"sensor\""),
+    ] {
+        assert_refused(&headed(&format!("{line}\n{RUN}")), &["line 3", wanted]);
+    }
+}
+
+#[test]
+fn a_kind_that_is_misspelt_or_missing_is_refused() {
+    let text = headed("[[run]]\nkind = \"rotaton\"\nfile = \"rot.csv\"\n");
+    assert_refused(&text, &["line 4, column 8", "`kind` is \"rotaton\"", "\"rotation\" or \"ringdown\""]);
+    assert_refused(&headed("[[run]]\nfile = \"rot.csv\"\n"), &["line 3", "this run has no `kind`"]);
+    assert_refused(&headed("[[run]]\nkind = \"rotation\"\n"), &["line 3", "this run has no `file`"]);
+}
+
+#[test]
+fn a_ring_down_needs_its_angle_and_its_time() {
+    let ringdown = "[[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\n";
+    assert_refused(&headed(&format!("{RUN}{ringdown}energy_off_s = 1\n")), &["line 6", "no `angle_deg`"]);
+    assert_refused(&headed(&format!("{RUN}{ringdown}angle_deg = 1\n")), &["line 6", "no `energy_off_s`"]);
+    let text = headed(&format!("{RUN}{ringdown}angle_deg = 1\nenergy_off_s = 0\n"));
+    assert_refused(&text, &["line 10", "`energy_off_s` is 0", "positive"]);
+    let text = headed(&format!("{RUN}{ringdown}angle_deg = 1\nenergy_off_s = 1\n")).replace("ring.csv", "rot.csv");
+    assert_refused(&text, &["rot.csv", "a ring-down needs"]);
+}
+
+#[test]
+fn a_campaign_without_a_rotation_to_fit_is_refused() {
+    assert_refused("[campaign]\ndevice = \"a\"\n", &["there is no `[[run]]`"]);
+    let ringdown = "[[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\nangle_deg = 0\nenergy_off_s = 1\n";
+    assert_refused(&headed(ringdown), &["no run is a rotation"]);
+    assert_refused(&headed(&format!("{RUN}use = \"holdout\"\n")), &["every rotation run has `use = \"holdout\"`"]);
+}
+
+#[test]
+fn a_sensor_has_no_ring_down() {
+    let ringdown = "[[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\nangle_deg = 0\nenergy_off_s = 1\n";
+    let text = headed(&format!("instrument = \"sensor\"\n{RUN}{ringdown}"));
+    assert_refused(&text, &["line 7", "a sensor has nothing that rings down"]);
+}
+
+#[test]
+fn text_that_is_not_toml_is_refused_with_its_line() {
+    assert_refused("[campaign]\ndevice = dfp-7\n", &["campaign.toml: line 2", "wanted valid TOML"]);
+    assert_refused("", &["there is no `[campaign]`"]);
+    assert_refused("campaign = 1\n", &["line 1", "`campaign` is not a table"]);
+    assert_refused(&headed("[run]\nkind = \"rotation\"\n"), &["line 3", "`[[run]]`"]);
+}
+
+#[test]
+fn a_device_without_a_name_takes_that_of_its_folder_and_says_so() {
+    let (folder, path) = campaign(&format!("[campaign]\n{RUN}"));
+    let campaign = Campaign::open(&path).unwrap();
+    assert_eq!(campaign.device, folder.path().file_name().unwrap().to_string_lossy());
+    assert!(campaign.warnings[0].contains("`device` is not given"), "{:?}", campaign.warnings);
+}
+
+#[test]
+fn a_campaign_file_that_is_not_there_or_a_folder_is_refused() {
+    let (folder, _) = campaign("");
+    let message = Campaign::open(&folder.path().join("no.toml")).unwrap_err().to_string();
+    assert!(message.ends_with("no.toml: there is no such file"), "{message}");
+    let message = Campaign::open(folder.path()).unwrap_err().to_string();
+    assert!(message.contains("is a directory; wanted a recording"), "{message}");
+}

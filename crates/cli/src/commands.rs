@@ -1,0 +1,137 @@
+//! What each command does.
+
+use std::cell::RefCell;
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::Duration;
+
+use cvg_calibration::calibration::Calibration;
+use cvg_calibration::recording::{Campaign, Recording};
+use cvg_calibration::{Identification, Options};
+use cvg_simulator::Scenario;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::{Failure, html, output};
+
+/// `cvg simulate`
+pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
+    let text = std::fs::read_to_string(scenario)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", scenario.display())))?;
+    let parsed = Scenario::parse(&text).map_err(|e| Failure::input(format!("{}: {e}", scenario.display())))?;
+    parsed.simulate().write(out).map_err(Failure::input)?;
+    eprintln!("wrote {}", out.join("campaign.toml").display());
+    Ok(())
+}
+
+/// `cvg identify`
+pub(crate) fn identify(campaign: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+    if out.is_none() && !json {
+        return Err(Failure::input("identify needs --out DIR for its files, or --json to print the report"));
+    }
+    let identified = run(campaign)?;
+    if let Some(out) = out {
+        write_results(&identified, out)?;
+    }
+    if json {
+        println!("{}", report_json(&identified)?);
+    } else {
+        print!("{}", summary(&identified));
+    }
+    Ok(())
+}
+
+/// Identifies a campaign, with a spinner where a person is watching.
+pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
+    let bar = RefCell::new(None::<ProgressBar>);
+    let started = std::time::Instant::now();
+    let show = |what: &str| {
+        let watched = std::io::stderr().is_terminal() && started.elapsed() > Duration::from_millis(500);
+        let mut bar = bar.borrow_mut();
+        if bar.is_none() && watched {
+            let spinner = ProgressBar::new_spinner();
+            spinner.set_style(ProgressStyle::default_spinner());
+            spinner.enable_steady_tick(Duration::from_millis(100));
+            *bar = Some(spinner);
+        }
+        if let Some(bar) = &*bar {
+            bar.set_message(what.to_owned());
+        }
+    };
+    show("reading");
+    let opened = Campaign::open(campaign)?;
+    let identified = cvg_calibration::identify(opened, &Options { discover: true, progress: &show });
+    if let Some(bar) = bar.borrow_mut().take() {
+        bar.finish_and_clear();
+    }
+    Ok(identified?)
+}
+
+/// Writes report.json, report.html and calibration.toml.
+pub(crate) fn write_results(identified: &Identification, out: &Path) -> Result<(), Failure> {
+    output::write(&out.join("report.json"), report_json(identified)?.as_bytes())?;
+    output::write(&out.join("report.html"), html::report(identified)?.as_bytes())?;
+    output::write(&out.join("calibration.toml"), identified.calibration.to_text().as_bytes())
+}
+
+/// report.json
+pub(crate) fn report_json(identified: &Identification) -> Result<String, Failure> {
+    serde_json::to_string_pretty(&identified.report).map_err(Failure::input)
+}
+
+/// `cvg compensate`
+pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path) -> Result<(), Failure> {
+    let calibration = Calibration::read(calibration)?;
+    let recording = Recording::read(recording)?;
+    recording.require_rotation()?;
+    for w in &recording.warnings {
+        eprintln!("warning: {w}");
+    }
+    let compensated = cvg_calibration::compensate(&calibration, &recording)?;
+    let mut bytes = Vec::new();
+    if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
+        compensated.write_parquet(&mut bytes)
+    } else {
+        compensated.write_csv(&mut bytes)
+    }
+    .map_err(|e| Failure::input(format!("{}: {e}", out.display())))?;
+    output::write(out, &bytes)?;
+    eprintln!("wrote {}", out.display());
+    Ok(())
+}
+
+/// What a person wants to read first.
+pub(crate) fn summary(identified: &Identification) -> String {
+    use std::fmt::Write as _;
+    let r = &identified.report;
+    let mut s = String::new();
+    let mut line = |text: String| {
+        let _ = writeln!(s, "{text}");
+    };
+    line(format!("{} ({})", r.device, r.instrument));
+    let raw = r.heldout.raw.map_or("raw angle does not turn".to_owned(), |e| format!("raw {:.5}°", e.rms_deg));
+    line(format!(
+        "  held-out angle error, rms   {raw} → declared {:.5}° → discovered {:.5}°   (noise floor {:.5}°)",
+        r.heldout.declared.rms_deg, r.heldout.discovered.rms_deg, r.heldout.noise_floor_deg
+    ));
+    let estimate = |e: &Option<cvg_calibration::report::Estimate>| {
+        e.as_ref()
+            .map_or("not told by this campaign".to_owned(), |e| format!("{:.6} ± {:.1e}", e.value, e.half_width()))
+    };
+    line(format!("  angular gain k              {}", estimate(&Some(r.angular_gain))));
+    line(format!("  detection gain G_Dy/G_Dx    {}", estimate(&r.detection_gain_ratio)));
+    line(format!("  actuation gain G_Ax/G_Ay    {}", estimate(&r.actuation_gain_ratio)));
+    for e in &r.effects {
+        let parameters = e.parameters.iter().map(|p| format!("{} = {:.6} {}", p.name, p.value, p.unit));
+        let origin = format!("{:?}", e.origin).to_lowercase();
+        line(format!("  {:<11} {:<26} {}", origin, e.id, parameters.collect::<Vec<_>>().join(", ")));
+    }
+    for u in &r.unexplained {
+        let n = u.n.map(|n| format!(" n = {n}")).unwrap_or_default();
+        let f = u.frequency_hz.map(|f| format!(" {f:.4} Hz")).unwrap_or_default();
+        line(format!("  unexplained {}{n}{f}: {:.5}° rms; {}", u.class, u.rms_deg, u.suggestion));
+    }
+    for w in &r.warnings {
+        line(format!("  warning: {w}"));
+    }
+    s
+}

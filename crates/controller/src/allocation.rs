@@ -1,0 +1,152 @@
+//! Commands along the orbit's axes → commands of the X and Y drives: Equation 9, with the actuation's imperfections
+//! inverted beforehand, within the drives' limit.
+//!
+//! It refuses to find the direction: it takes its cosine and sine.
+
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, Stage, Values};
+use cvg_model::{AxisForces, Float};
+
+use crate::pi::within;
+use crate::{ConfigError, Status, positive};
+
+/// What the loops ask along the orbit, V: major (a) and minor (q) axis, in phase (c) and in quadrature (s).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct OrbitCommands<T> {
+    /// energy
+    pub v_as: T,
+    /// precession
+    pub v_qs: T,
+    /// quadrature
+    pub v_qc: T,
+    /// phase
+    pub v_ac: T,
+}
+
+/// The inverse of what the drives do to the commands: a 2×2 matrix from (x, y) to (x, y), the same for both phases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActuationCompensation<T> {
+    xx: T,
+    xy: T,
+    yx: T,
+    yy: T,
+}
+
+impl<T: Float> ActuationCompensation<T> {
+    /// The inverse of the actuation `effects` of the library, which act in the order of [`EffectId::ALL`].
+    ///
+    /// # Errors
+    /// An effect that does not act on the forces, a parameter that is not finite or outside its bounds, or drives
+    /// that cannot push in every direction (determinant below a thousandth).
+    pub fn new(effects: &[(EffectId, Values<T>)]) -> Result<Self, ConfigError> {
+        for (id, values) in effects {
+            check(*id, values)?;
+        }
+        let through = |unit: AxisForces<T>| {
+            EffectId::ALL.iter().fold(unit, |f, id| {
+                effects.iter().filter(|(e, _)| e == id).fold(f, |f, (e, values)| e.actuate(values, f))
+            })
+        };
+        let (zero, one) = (T::zero(), T::one());
+        let of_x = through(AxisForces { x_c: one, x_s: zero, y_c: zero, y_s: zero });
+        let of_y = through(AxisForces { x_c: zero, x_s: zero, y_c: one, y_s: zero });
+        let determinant = of_x.x_c * of_y.y_c - of_y.x_c * of_x.y_c;
+        if !(determinant.magnitude() > T::ratio(1, 1000) && determinant.is_finite()) {
+            return Err(ConfigError { parameter: "effects", expected: "drives that push in every direction" });
+        }
+        Ok(Self {
+            xx: of_y.y_c / determinant,
+            xy: -of_y.x_c / determinant,
+            yx: -of_x.y_c / determinant,
+            yy: of_x.x_c / determinant,
+        })
+    }
+
+    #[inline]
+    fn apply(&self, f: AxisForces<T>) -> AxisForces<T> {
+        AxisForces {
+            x_c: self.xx * f.x_c + self.xy * f.y_c,
+            x_s: self.xx * f.x_s + self.xy * f.y_s,
+            y_c: self.yx * f.x_c + self.yy * f.y_c,
+            y_s: self.yx * f.x_s + self.yy * f.y_s,
+        }
+    }
+}
+
+/// The allocation's configuration; it has no state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allocation<T> {
+    compensation: Option<ActuationCompensation<T>>,
+    limit_v: T,
+}
+
+/// Commands of the drives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive<T> {
+    /// V per channel and phase; finite and within the limit, always
+    pub volts: AxisForces<T>,
+    /// what became of it
+    pub status: Status,
+}
+
+impl<T: Float> Allocation<T> {
+    /// An allocation within ±`limit_v` (> 0) per channel and phase.
+    ///
+    /// # Errors
+    /// A limit outside its domain.
+    pub fn new(compensation: Option<ActuationCompensation<T>>, limit_v: T) -> Result<Self, ConfigError> {
+        Ok(Self { compensation, limit_v: positive(limit_v, "limit_v")? })
+    }
+
+    /// The drives' commands for an orbit along (`cos`, `sin`): Equation 9 at unit gains, completed by the forces it
+    /// does not use (v_qs along the minor axis, v_ac along the major one):
+    ///
+    /// $$x_c = -v_{qc}\sin\theta + v_{ac}\cos\theta,\quad x_s = v_{as}\cos\theta - v_{qs}\sin\theta,$$
+    /// $$y_c = v_{qc}\cos\theta + v_{ac}\sin\theta,\quad y_s = v_{as}\sin\theta + v_{qs}\cos\theta.$$
+    ///
+    /// Total: a channel that is asked for more than the limit gets the limit, for no number gets 0.
+    #[inline]
+    pub fn step(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> Drive<T> {
+        let projected = AxisForces {
+            x_c: v.v_ac * cos - v.v_qc * sin,
+            x_s: v.v_as * cos - v.v_qs * sin,
+            y_c: v.v_qc * cos + v.v_ac * sin,
+            y_s: v.v_as * sin + v.v_qs * cos,
+        };
+        let asked = match &self.compensation {
+            Some(inverse) => inverse.apply(projected),
+            None => projected,
+        };
+        let fits = |f: T| within(f, self.limit_v);
+        if fits(asked.x_c) && fits(asked.x_s) && fits(asked.y_c) && fits(asked.y_s) {
+            return Drive { volts: asked, status: Status::Within };
+        }
+        let finite = asked.x_c.is_finite() && asked.x_s.is_finite() && asked.y_c.is_finite() && asked.y_s.is_finite();
+        Drive {
+            volts: AxisForces {
+                x_c: asked.x_c.bounded(self.limit_v),
+                x_s: asked.x_s.bounded(self.limit_v),
+                y_c: asked.y_c.bounded(self.limit_v),
+                y_s: asked.y_s.bounded(self.limit_v),
+            },
+            status: if finite { Status::Limited } else { Status::Invalid },
+        }
+    }
+}
+
+fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> {
+    let description = id.description();
+    if description.stage != Stage::Actuation {
+        return Err(ConfigError { parameter: description.id, expected: "an effect of the actuation" });
+    }
+    for (value, parameter) in values.iter().zip(description.parameters) {
+        let v = value.to_f64();
+        if !(v >= parameter.lower && v <= parameter.upper) {
+            return Err(ConfigError { parameter: parameter.name, expected: "finite and within its bounds" });
+        }
+    }
+    let unused = MAX_PARAMETERS.saturating_sub(description.parameters.len());
+    if values.iter().rev().take(unused).any(|v| *v != T::zero()) {
+        return Err(ConfigError { parameter: description.id, expected: "given no more values than it has parameters" });
+    }
+    Ok(())
+}

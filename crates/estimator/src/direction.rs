@@ -1,0 +1,59 @@
+//! The direction of the orbit's major axis as a cosine and a sine, without the angle: what the projection of forces
+//! (Equation 9) and of measurements needs of Equation 4, for two square roots and one division.
+//!
+//! It refuses to unwrap: it is a direction of the instant, told from its opposite by the in-phase vibration.
+
+use cvg_model::{Envelope, Float, Pendulum, Real};
+
+use crate::Status;
+
+/// Cosine and sine of θ_d over the full turn: of the two directions of the major axis, the one along which the
+/// in-phase vibration is positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction<T> {
+    /// cos θ_d
+    pub cos: T,
+    /// sin θ_d
+    pub sin: T,
+    /// whether the envelope determined it
+    pub status: Status,
+}
+
+/// The direction of **Equation 4** by half-angle algebra instead of ½ atan2(S, R).
+///
+/// With ρ = √(R² + S²), 2ρ cos²θ = ρ + R, 2ρ sin²θ = ρ − R and 2ρ sin θ cos θ = S. So the direction is
+///
+/// $$(\cos\theta, \sin\theta) = \pm\frac{(\rho+R,\ S)}{\sqrt{2\rho(\rho+R)}}\quad (R\ge0),\qquad
+///   \pm\frac{(S,\ \rho-R)}{\sqrt{2\rho(\rho-R)}}\quad (R<0),$$
+///
+/// each where it does not cancel, with the sign that makes the in-phase vibration along it positive. It equals
+/// Equation 4 up to that sign, and follows the pattern through 90° without a jump, which the principal value of
+/// Equation 4 does not: forces projected on it keep their sense.
+///
+/// `p` are the pendulum variables of `e`. Domain: R² + S² > 0 and an in-phase vibration along the major axis;
+/// elsewhere the direction (1, 0) and [`Status::Undetermined`] (for finite input) or [`Status::Invalid`].
+#[inline]
+pub fn major_axis<T: Float>(e: &Envelope<T>, p: &Pendulum<T>) -> Direction<T> {
+    let line = p.r.norm(p.s);
+    let (cos, sin) = if p.r < T::zero() { (p.s, line - p.r) } else { (line + p.r, p.s) };
+    let in_phase = cos * e.x_c + sin * e.y_c;
+    // the length of (cos, sin), squared
+    let length_2 = T::two() * line * (line + p.r.magnitude());
+    // false for NaN and for an overflow
+    if length_2 > T::zero() && length_2.is_finite() && in_phase != T::zero() {
+        let scale = T::one() / length_2.sqrt();
+        let scale = if in_phase < T::zero() { -scale } else { scale };
+        Direction { cos: cos * scale, sin: sin * scale, status: Status::Valid }
+    } else {
+        let status = if length_2.is_finite() { Status::Undetermined } else { Status::Invalid };
+        Direction { cos: T::one(), sin: T::zero(), status }
+    }
+}
+
+impl<T: Real> Direction<T> {
+    /// θ_d over the full turn, in (−π, π], rad.
+    #[inline]
+    pub fn angle(&self) -> T {
+        self.sin.atan2(self.cos)
+    }
+}

@@ -1,0 +1,119 @@
+//! The pattern angle: Equation 4, unwrapped, whatever comes in.
+
+use approx::assert_abs_diff_eq;
+use cvg_estimator::direction::major_axis;
+use cvg_estimator::{AngleState, PatternAngle, Period, Status};
+use cvg_model::{Envelope, Orbit};
+use proptest::prelude::*;
+
+fn tracker(period: Period) -> PatternAngle<f64> {
+    PatternAngle::new(period, 1e-6).expect("valid")
+}
+
+fn orbit(theta: f64, q: f64, delta: f64) -> Envelope<f64> {
+    Orbit { a: 1.0, q, theta, delta }.envelope()
+}
+
+#[test]
+fn a_pattern_that_turns_is_followed_over_its_period_in_both_senses() {
+    for sense in [1.0, -1.0] {
+        let angle = tracker(Period::Pattern);
+        let mut state = AngleState::default();
+        let mut first = None;
+        for k in 0..2000 {
+            let theta = sense * 0.05 * f64::from(k);
+            let seen = angle.step(&mut state, &orbit(theta, 0.01, 0.02)).degrees(Period::Pattern);
+            let start = *first.get_or_insert(seen);
+            assert_abs_diff_eq!(seen - start, theta.to_degrees(), epsilon = 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_full_turn_sensor_is_followed_over_its_own_period() {
+    let angle = tracker(Period::FullTurn);
+    let mut state = AngleState::default();
+    for k in 0..500 {
+        let theta = 0.1 * f64::from(k);
+        let reading = angle.step(&mut state, &Envelope::new(theta.cos(), 0.0, theta.sin(), 0.0));
+        assert_abs_diff_eq!(reading.degrees(Period::FullTurn), theta.to_degrees(), epsilon = 1e-9);
+    }
+}
+
+#[test]
+fn single_precision_keeps_its_resolution_after_a_day() {
+    let angle = PatternAngle::<f32>::new(Period::Pattern, 1e-6).expect("valid");
+    // a day at 500 deg/s
+    let mut state = AngleState { periods: 240_000, within_rad: 0.5 };
+    let (sin, cos) = 0.500_01_f32.sin_cos();
+    let reading = angle.step(&mut state, &Envelope::new(cos, 0.0, sin, 0.0));
+    let expected = 240_000.0 * 180.0 + 0.500_01_f64.to_degrees();
+    assert_abs_diff_eq!(reading.degrees(Period::Pattern), expected, epsilon = 1e-5);
+}
+
+#[test]
+fn an_envelope_without_direction_holds_the_last_reading_and_says_so() {
+    let angle = tracker(Period::Pattern);
+    let mut state = AngleState::default();
+    let known = angle.step(&mut state, &orbit(0.3, 0.0, 0.0));
+    let rest = angle.step(&mut state, &Envelope::zero());
+    assert_eq!((rest.within_rad, rest.status), (known.within_rad, Status::Undetermined));
+    let broken = angle.step(&mut state, &Envelope::new(f64::NAN, 0.0, 1.0, 0.0));
+    assert_eq!((broken.within_rad, broken.status), (known.within_rad, Status::Invalid));
+    assert_eq!(angle.step(&mut state, &orbit(0.31, 0.0, 0.0)).status, Status::Valid);
+}
+
+#[test]
+fn a_threshold_that_is_no_amplitude_is_refused() {
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(PatternAngle::new(Period::Pattern, bad).map_err(|e| e.parameter), Err("least_v"));
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_bit_pattern_gives_a_finite_reading_inside_its_period(
+        bits in prop::array::uniform4(any::<u64>()), periods: i64, within: u64, full: bool,
+    ) {
+        let period = if full { Period::FullTurn } else { Period::Pattern };
+        let [x_c, x_s, y_c, y_s] = bits.map(f64::from_bits);
+        let mut state = AngleState { periods, within_rad: f64::from_bits(within) };
+        let reading = tracker(period).step(&mut state, &Envelope::new(x_c, x_s, y_c, y_s));
+        prop_assert!(reading.within_rad.to_degrees().abs() <= period.degrees() / 2.0 + 1e-9);
+    }
+
+    #[test]
+    fn any_bit_pattern_in_single_precision_too(bits in prop::array::uniform4(any::<u32>()), within: u32) {
+        let [x_c, x_s, y_c, y_s] = bits.map(f32::from_bits);
+        let mut state = AngleState { periods: 0, within_rad: f32::from_bits(within) };
+        let angle = PatternAngle::<f32>::new(Period::Pattern, 0.0).expect("valid");
+        let reading = angle.step(&mut state, &Envelope::new(x_c, x_s, y_c, y_s));
+        prop_assert!(reading.within_rad.is_finite() && reading.within_rad.abs() < 1.6);
+    }
+
+    #[test]
+    fn the_direction_by_algebra_is_that_of_equation_4(
+        theta in -3.1_f64..3.1, q in -0.9_f64..0.9, delta in -1.5_f64..1.5, a in 1e-3_f64..1e3,
+    ) {
+        let e = Orbit { a, q: q * a, theta, delta }.envelope();
+        let p = e.pendulum();
+        let direction = major_axis(&e, &p);
+        prop_assert_eq!(direction.status, Status::Valid);
+        // the same axis …
+        let (sin, cos) = p.angle().sin_cos();
+        prop_assert!((direction.cos * sin - direction.sin * cos).abs() < 1e-12);
+        // … a unit vector …
+        prop_assert!((direction.cos.hypot(direction.sin) - 1.0).abs() < 1e-14);
+        // … in the sense of the in-phase vibration
+        prop_assert!(direction.cos * e.x_c + direction.sin * e.y_c > 0.0);
+        prop_assert!((direction.angle() - theta).sin().abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_direction_of_any_bit_pattern_is_a_unit_vector(bits in prop::array::uniform4(any::<u64>())) {
+        let [x_c, x_s, y_c, y_s] = bits.map(f64::from_bits);
+        let e = Envelope::new(x_c, x_s, y_c, y_s);
+        let direction = major_axis(&e, &e.pendulum());
+        prop_assert!((direction.cos.hypot(direction.sin) - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,130 @@
+//! What misaligned and unequal forces do (Equations 8, 9 and 10).
+//!
+//! Signs are those of Equation 3: v_as > 0 takes energy out. With F = f_c − i f_s the envelope moves at F/(2iω), so
+//! in the orbit frame, for q ≈ 0: ȧ ∋ −f_as/2ω, θ̇ ∋ −f_qs/(2ωa), q̇ ∋ +f_qc/2ω, δ̇ ∋ −f_ac/(2ωa).
+
+use crate::{Envelope, Real};
+
+/// Outputs of the energy and the quadrature controller (Equation 3), V.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ControlOutputs<T> {
+    /// v_as: along the major axis, in quadrature with the reference (energy)
+    pub v_as: T,
+    /// v_qc: along the minor axis, in phase with the reference (quadrature)
+    pub v_qc: T,
+}
+
+/// Voltage-to-force gains of the two drive channels, force (per unit mass) per volt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ActuationGains<T> {
+    /// G_Ax
+    pub x: T,
+    /// G_Ay
+    pub y: T,
+}
+
+/// Forces along the semi-axes of the orbit, in phase (c) and in quadrature (s) with the reference.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct OrbitForces<T> {
+    /// f_as: major axis, quadrature phase; changes the energy
+    pub a_s: T,
+    /// f_qs: minor axis, quadrature phase; precesses the pattern
+    pub q_s: T,
+    /// f_ac: major axis, in phase; shifts the oscillation's phase
+    pub a_c: T,
+    /// f_qc: minor axis, in phase; changes the quadrature
+    pub q_c: T,
+}
+
+/// Forces along X and Y, in phase (c) and in quadrature (s) with the reference.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct AxisForces<T> {
+    /// f_xc
+    pub x_c: T,
+    /// f_xs
+    pub x_s: T,
+    /// f_yc
+    pub y_c: T,
+    /// f_ys
+    pub y_s: T,
+}
+
+/// **Equation 8**, the forces along the true orbit when they are applied at an orientation wrong by `theta_error` (rad):
+///
+/// $$f_{as} = G_A v_{as}\cos\theta_{error},\quad f_{qs} = G_A v_{as}\sin\theta_{error},$$
+/// $$f_{ac} = -G_A v_{qc}\sin\theta_{error},\quad f_{qc} = G_A v_{qc}\cos\theta_{error}.$$
+///
+/// A rotation by θ_error, so f_as² + f_qs² = (G_A v_as)². `gain` = G_A, equal on both axes. Source: the paper,
+/// Equation 8.
+#[inline]
+pub fn misaligned_forces<T: Real>(gain: T, v: &ControlOutputs<T>, theta_error: T) -> OrbitForces<T> {
+    let (sin, cos) = theta_error.sin_cos();
+    OrbitForces {
+        a_s: gain * v.v_as * cos,
+        q_s: gain * v.v_as * sin,
+        a_c: -gain * v.v_qc * sin,
+        q_c: gain * v.v_qc * cos,
+    }
+}
+
+impl<T: Real> ActuationGains<T> {
+    /// **Equation 9**, the forces along X and Y when the commands are projected at `theta` (rad):
+    ///
+    /// $$f_{xc} = -G_{Ax} v_{qc}\sin\theta,\quad f_{xs} = G_{Ax} v_{as}\cos\theta,$$
+    /// $$f_{yc} = G_{Ay} v_{qc}\cos\theta,\quad f_{ys} = G_{Ay} v_{as}\sin\theta.$$
+    ///
+    /// Domain: all reals. Source: the paper, Equation 9.
+    #[inline]
+    pub fn axis_forces(&self, v: &ControlOutputs<T>, theta: T) -> AxisForces<T> {
+        let (sin, cos) = theta.sin_cos();
+        AxisForces {
+            x_c: -self.x * v.v_qc * sin,
+            x_s: self.x * v.v_as * cos,
+            y_c: self.y * v.v_qc * cos,
+            y_s: self.y * v.v_as * sin,
+        }
+    }
+
+    /// **Equation 10**, the same forces along the orbit at `theta` (rad):
+    ///
+    /// $$f_{as} = \tfrac12(G_{Ay}-G_{Ax})v_{as}(1-\cos 2\theta) + G_{Ax}v_{as},\quad
+    ///   f_{qs} = \tfrac12(G_{Ay}-G_{Ax})v_{as}\sin 2\theta,$$
+    /// $$f_{ac} = \tfrac12(G_{Ay}-G_{Ax})v_{qc}\sin 2\theta,\quad
+    ///   f_{qc} = \tfrac12(G_{Ay}-G_{Ax})v_{qc}(1+\cos 2\theta) + G_{Ax}v_{qc}.$$
+    ///
+    /// Equation 9 rotated by −θ; at G_Ax = G_Ay it is Equation 8 with θ_error = 0. Source: the paper, Equation 10.
+    #[inline]
+    pub fn orbit_forces(&self, v: &ControlOutputs<T>, theta: T) -> OrbitForces<T> {
+        let (sin_2theta, cos_2theta) = (T::two() * theta).sin_cos();
+        let half_difference = T::half() * (self.y - self.x);
+        OrbitForces {
+            a_s: half_difference * v.v_as * (T::one() - cos_2theta) + self.x * v.v_as,
+            q_s: half_difference * v.v_as * sin_2theta,
+            a_c: half_difference * v.v_qc * sin_2theta,
+            q_c: half_difference * v.v_qc * (T::one() + cos_2theta) + self.x * v.v_qc,
+        }
+    }
+}
+
+impl<T: Real> AxisForces<T> {
+    /// These forces seen along an orbit at `theta` (rad): the rotation by −θ that leads from Equation 9 to 10.
+    #[inline]
+    pub fn along_orbit(&self, theta: T) -> OrbitForces<T> {
+        let (sin, cos) = theta.sin_cos();
+        OrbitForces {
+            a_s: cos * self.x_s + sin * self.y_s,
+            q_s: -sin * self.x_s + cos * self.y_s,
+            a_c: cos * self.x_c + sin * self.y_c,
+            q_c: -sin * self.x_c + cos * self.y_c,
+        }
+    }
+
+    /// The rate at which these forces move the envelope: F/(2iω) with F = f_c − i f_s, so that the in-phase part
+    /// moves at −f_s/2ω and the quadrature part at +f_c/2ω. `two_omega` = 2ω in rad/s, ≠ 0.
+    #[inline]
+    pub fn envelope_rate(&self, two_omega: T) -> Envelope<T> {
+        Envelope::new(-self.x_s / two_omega, self.x_c / two_omega, -self.y_s / two_omega, self.y_c / two_omega)
+    }
+}

@@ -1,0 +1,42 @@
+//! Unequal readout gains: y_d = g·y with g = G_Dy/G_Dx (Equations 5 to 7).
+
+use super::{Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
+use crate::{DetectionGains, Envelope, Real};
+
+/// unequal detection gains.
+pub struct DetectionGainMismatch;
+
+impl Effect for DetectionGainMismatch {
+    const DESCRIPTION: Description = Description {
+        id: "detection-gain-mismatch",
+        title: "unequal detection gains",
+        stage: Stage::Readout,
+        declared: true,
+        empirical: false,
+        in_sensors: true,
+        parameters: &[Parameter {
+            name: "detection_gain_ratio",
+            unit: "1",
+            lower: 0.2,
+            upper: 5.0,
+            neutral: 1.0,
+            scale: 1e-3,
+            role: Role::Fitted,
+        }],
+        onsets: &[],
+        shown: &[Shown::Plain(0)],
+        signature: "angle ½(g−1) sin 2θ; amplitude ½(g−1)(1−cos 2θ)",
+        scaling: Scaling { rate: 0, amplitude: 0, odd_in_rate: false },
+        source: "the paper, Equations 5 to 7",
+    };
+
+    #[inline]
+    fn read<T: Real>(&[g, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
+        DetectionGains { x: T::one(), y: g }.measure(&e)
+    }
+
+    #[inline]
+    fn unread<T: Real>(&[g, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
+        DetectionGains { x: T::one(), y: T::one() / g }.measure(&e)
+    }
+}

@@ -1,0 +1,316 @@
+//! What a recording can hold: the library of effects.
+//!
+//! An effect exists once, here, in a file of its own: its forward definition at signal level, its parameters with
+//! units and bounds, its signature and its source. The simulator applies the definition, the identification predicts
+//! from it, the compensation inverts it, and the documentation prints it.
+//!
+//! **To add an effect**: write `effects/my_effect.rs` with a type that implements [`Effect`], and add its line to the
+//! list at the end of this file. Nothing else names effects one by one.
+//!
+//! A recording is made in four stages, and an effect acts in one of them: the [`Stage`].
+
+use crate::{AxisForces, Envelope, Real};
+
+pub mod actuation_gain_mismatch;
+pub mod actuation_skew;
+pub mod angle_latency;
+pub mod anisodamping;
+pub mod anisoelasticity;
+pub mod detection_cubic;
+pub mod detection_gain_mismatch;
+pub mod detection_offset;
+pub mod detection_saturation;
+pub mod detection_skew;
+pub mod gain_drift;
+pub mod harmonic_n;
+pub mod scale_drift;
+pub mod spring_cubic;
+pub mod table_harmonic;
+pub mod time_periodic;
+
+/// The most parameters one effect may have.
+pub const MAX_PARAMETERS: usize = 4;
+
+/// Values of an effect's parameters, in the order of its [`Description::parameters`]; unused places are 0.
+pub type Values<T> = [T; MAX_PARAMETERS];
+
+/// Where in the making of a recording an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// on the rotation that reaches the resonator
+    Input,
+    /// in the resonator: a rate of change of the envelope
+    Mechanics,
+    /// on the forces that the drive channels make of the commands
+    Actuation,
+    /// on the envelope that the readout makes of the vibration
+    Readout,
+}
+
+/// The instant at which an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Moment<T> {
+    /// time of the recording, s
+    pub t_s: T,
+    /// angle of the table, rad
+    pub table_rad: T,
+    /// nominal precession rate −kΩ, rad/s
+    pub precession_rad_s: T,
+}
+
+/// One parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// the field's name for it
+    pub name: &'static str,
+    /// unit, in the notation of the report ("1/V^2")
+    pub unit: &'static str,
+    /// smallest admissible value
+    pub lower: f64,
+    /// largest admissible value
+    pub upper: f64,
+    /// value at which the effect is absent
+    pub neutral: f64,
+    /// a change that is small but plain to see (of the order of 1 mrad in angle)
+    pub scale: f64,
+    /// how a fit treats it
+    pub role: Role,
+}
+
+/// How a fit treats a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// adjusted together with all others
+    Fitted,
+    /// held at its neutral value until the data asks for it
+    Refined,
+    /// chosen by a search and then held
+    Searched(Search),
+}
+
+/// Over what a parameter is searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Search {
+    /// harmonics of the pattern angle
+    PatternHarmonic,
+    /// harmonics of the table angle
+    TableHarmonic,
+    /// frequencies in time
+    Frequency,
+}
+
+/// How parameters are shown to people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shown {
+    /// the parameter as it is
+    Plain(usize),
+    /// two parameters (c, s) as magnitude √(c² + s²) and angle atan2(s, c)/`division`, in degrees
+    Polar {
+        /// index of the cosine part
+        cos: usize,
+        /// index of the sine part
+        sin: usize,
+        /// name of the magnitude
+        magnitude: &'static str,
+        /// unit of the magnitude
+        unit: &'static str,
+        /// name of the angle
+        angle: &'static str,
+        /// the angle is atan2(s, c) divided by this (2 for a principal axis)
+        division: f64,
+    },
+}
+
+/// How an effect's share in the angle scales, the property that tells effects of one harmonic apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scaling {
+    /// exponent of the input rate |Ω|: 0 for readout effects, −1 for dynamic ones
+    pub rate: i8,
+    /// exponent of the amplitude a
+    pub amplitude: i8,
+    /// the sign of the effect follows the sign of Ω
+    pub odd_in_rate: bool,
+}
+
+/// What is known of an effect besides its definition.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Description {
+    /// identifier in campaigns, calibrations and reports
+    pub id: &'static str,
+    /// one line for people
+    pub title: &'static str,
+    /// where it acts
+    pub stage: Stage,
+    /// part of the paper's model
+    pub declared: bool,
+    /// a description without a cause: what is left to say when no physical effect explains a residual
+    pub empirical: bool,
+    /// a two-channel angle sensor without mechanics can have it too
+    pub in_sensors: bool,
+    /// its parameters
+    pub parameters: &'static [Parameter],
+    /// where a fit begins when the effect has no slope at its neutral values: values of the first parameter, in units
+    /// of one over the amplitude
+    pub onsets: &'static [f64],
+    /// how they are shown
+    pub shown: &'static [Shown],
+    /// small-signal signature, for people
+    pub signature: &'static str,
+    /// scaling of its share in the angle
+    pub scaling: Scaling,
+    /// where the definition comes from
+    pub source: &'static str,
+}
+
+/// An effect: its description and its forward definition in the stage where it acts.
+pub trait Effect {
+    /// What is known of it.
+    const DESCRIPTION: Description;
+
+    /// Input rate that reaches the resonator, rad/s, when the table turns at `rate_rad_s`.
+    #[inline]
+    fn input_rate<T: Real>(_: &Values<T>, rate_rad_s: T, _: &Moment<T>) -> T {
+        rate_rad_s
+    }
+
+    /// What the effect adds to the envelope's rate of change, per second.
+    #[inline]
+    fn mechanics<T: Real>(_: &Values<T>, _: &Envelope<T>) -> Envelope<T> {
+        Envelope::zero()
+    }
+
+    /// The forces that result when `f` is commanded.
+    #[inline]
+    fn actuate<T: Real>(_: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+        f
+    }
+
+    /// The envelope that the readout gives for the vibration `e`.
+    #[inline]
+    fn read<T: Real>(_: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
+        e
+    }
+
+    /// The vibration behind the readout `e`: the inverse of [`Effect::read`].
+    ///
+    /// By default the fixed point of z ← z + (e − read(z)), which contracts for an effect well below one; an effect
+    /// with a closed inverse gives that instead.
+    #[inline]
+    fn unread<T: Real>(p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
+        let mut z = e;
+        for _ in 0..FIXED_POINT_STEPS {
+            z = z + (e - Self::read(p, z, at));
+        }
+        z
+    }
+}
+
+/// Steps of the default inverse: an effect of 5 % is undone to 0.05^8 < 1e-10 of itself.
+const FIXED_POINT_STEPS: usize = 8;
+
+/// A description's default for a fitted parameter.
+const fn fitted(name: &'static str, unit: &'static str, bound: f64, scale: f64) -> Parameter {
+    Parameter { name, unit, lower: -bound, upper: bound, neutral: 0.0, scale, role: Role::Fitted }
+}
+
+/// A parameter that is held until the data asks for it.
+const fn refined(name: &'static str, unit: &'static str, bound: f64, scale: f64) -> Parameter {
+    Parameter { role: Role::Refined, ..fitted(name, unit, bound, scale) }
+}
+
+/// A parameter that a search sets.
+const fn searched(name: &'static str, unit: &'static str, lower: f64, upper: f64, over: Search) -> Parameter {
+    Parameter { name, unit, lower, upper, neutral: lower, scale: 1.0, role: Role::Searched(over) }
+}
+
+macro_rules! library {
+    ($($name:ident => $effect:path),+ $(,)?) => {
+        /// An effect of the library.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[allow(missing_docs, reason = "each variant is the effect of its name, documented in its own file")]
+        pub enum EffectId { $($name),+ }
+
+        impl EffectId {
+            /// Every effect; readout effects in the order in which a signal meets them.
+            pub const ALL: &'static [Self] = &[$(Self::$name),+];
+
+            /// What is known of it.
+            pub const fn description(self) -> &'static Description {
+                match self { $(Self::$name => const { &<$effect as Effect>::DESCRIPTION }),+ }
+            }
+
+            /// [`Effect::input_rate`]
+            #[inline]
+            pub fn input_rate<T: Real>(self, p: &Values<T>, rate_rad_s: T, at: &Moment<T>) -> T {
+                match self { $(Self::$name => <$effect as Effect>::input_rate(p, rate_rad_s, at)),+ }
+            }
+
+            /// [`Effect::mechanics`]
+            #[inline]
+            pub fn mechanics<T: Real>(self, p: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+                match self { $(Self::$name => <$effect as Effect>::mechanics(p, e)),+ }
+            }
+
+            /// [`Effect::actuate`]
+            #[inline]
+            pub fn actuate<T: Real>(self, p: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+                match self { $(Self::$name => <$effect as Effect>::actuate(p, f)),+ }
+            }
+
+            /// [`Effect::read`]
+            #[inline]
+            pub fn read<T: Real>(self, p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
+                match self { $(Self::$name => <$effect as Effect>::read(p, e, at)),+ }
+            }
+
+            /// [`Effect::unread`]
+            #[inline]
+            pub fn unread<T: Real>(self, p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
+                match self { $(Self::$name => <$effect as Effect>::unread(p, e, at)),+ }
+            }
+        }
+    };
+}
+
+impl EffectId {
+    /// The effect called `id`, if the library has it.
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|e| e.description().id == id)
+    }
+
+    /// Parameter values at which the effect is absent.
+    pub fn neutral<T: Real + crate::Float>(self) -> Values<T> {
+        let mut values = [T::zero(); MAX_PARAMETERS];
+        for (v, p) in values.iter_mut().zip(self.description().parameters) {
+            *v = T::from_f64(p.neutral);
+        }
+        values
+    }
+}
+
+impl core::fmt::Display for EffectId {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.description().id)
+    }
+}
+
+// The list. Readout effects stand in the order in which the signal meets them: what is added to the angle of the
+// vibration itself, then plates, axes, amplifier and converter.
+library! {
+    TableHarmonic => table_harmonic::TableHarmonic,
+    ScaleDrift => scale_drift::ScaleDrift,
+    Anisodamping => anisodamping::Anisodamping,
+    Anisoelasticity => anisoelasticity::Anisoelasticity,
+    SpringCubic => spring_cubic::SpringCubic,
+    ActuationGainMismatch => actuation_gain_mismatch::ActuationGainMismatch,
+    ActuationSkew => actuation_skew::ActuationSkew,
+    HarmonicN => harmonic_n::HarmonicN,
+    TimePeriodic => time_periodic::TimePeriodic,
+    AngleLatency => angle_latency::AngleLatency,
+    DetectionCubic => detection_cubic::DetectionCubic,
+    DetectionSkew => detection_skew::DetectionSkew,
+    DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
+    GainDrift => gain_drift::GainDrift,
+    DetectionOffset => detection_offset::DetectionOffset,
+    DetectionSaturation => detection_saturation::DetectionSaturation,
+}

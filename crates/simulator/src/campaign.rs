@@ -1,0 +1,307 @@
+//! Simulated recordings in memory, and the folder they are written to: campaign.toml, one CSV file per run, truth.toml.
+//!
+//! A row is one control sample as the electronics saw it: the readout with its noise and the commands computed from
+//! it, which are applied from that sample on. `rate_dps` is the commanded rate, `table_deg` the table's true angle.
+//!
+//! It refuses to touch files that are not its own: it creates the folder, overwrites its own names, deletes nothing.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use cvg_model::effects::EffectId;
+use serde::Serialize;
+
+use crate::scenario::{EffectSetting, Instrument, Purpose, Reference, Run, Scenario, Settings};
+
+/// One column of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// name with unit, as in the file
+    pub name: &'static str,
+    /// one value per row
+    pub values: Vec<f64>,
+}
+
+/// One recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimulatedRun {
+    /// the run as the scenario says it
+    pub run: Run,
+    /// columns of equal length; the first is `t_s`
+    pub columns: Vec<Column>,
+}
+
+/// All recordings of a scenario.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulated {
+    /// the scenario's settings
+    pub settings: Settings,
+    /// its runs, in order
+    pub runs: Vec<SimulatedRun>,
+}
+
+/// A file that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {source}", path.display())]
+pub struct WriteError {
+    /// which file or folder
+    pub path: PathBuf,
+    /// why not
+    pub source: io::Error,
+}
+
+impl SimulatedRun {
+    /// The values of a column, if the recording has it.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
+    }
+
+    /// The recording as CSV: nine significant digits of the column's largest value.
+    pub fn csv(&self) -> String {
+        let decimals: Vec<usize> = self.columns.iter().map(decimals).collect();
+        let names: Vec<&str> = self.columns.iter().map(|c| c.name).collect();
+        let mut text = names.join(",");
+        text.push('\n');
+        let rows = self.columns.iter().map(|c| c.values.len()).min().unwrap_or(0);
+        for row in 0..rows {
+            for (i, (column, decimals)) in self.columns.iter().zip(&decimals).enumerate() {
+                let value = column.values.get(row).copied().unwrap_or(f64::NAN);
+                let separator = if i == 0 { "" } else { "," };
+                // writing to a string does not fail
+                let _ = if column.name == "rate_dps" {
+                    write!(text, "{separator}{value}")
+                } else {
+                    write!(text, "{separator}{value:.decimals$}")
+                };
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Decimals that a column is written with.
+fn decimals(column: &Column) -> usize {
+    let largest = column.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    match column.name {
+        // as few as hold every time stamp exactly, at least four
+        "t_s" => {
+            let exact = |d: &i32| {
+                column.values.iter().take(64).all(|t| {
+                    let scaled = t * 10_f64.powi(*d);
+                    (scaled - scaled.round()).abs() < 1e-6
+                })
+            };
+            (4..9).find(exact).map_or(9, |d| usize::try_from(d).unwrap_or(9))
+        }
+        "table_deg" | "theta_deg" => 7,
+        _ if largest > 0.0 && largest.is_finite() => {
+            #[allow(clippy::cast_possible_truncation, reason = "the logarithm of a finite number is small")]
+            let magnitude = largest.log10().floor() as i32;
+            usize::try_from((8 - magnitude).clamp(0, 20)).unwrap_or(0)
+        }
+        _ => 0,
+    }
+}
+
+impl Simulated {
+    /// Simulates every run of `scenario`.
+    pub fn new(scenario: &Scenario) -> Self {
+        let runs = scenario.settings().runs.iter().enumerate();
+        let simulated =
+            runs.map(|(index, run)| SimulatedRun { run: run.clone(), columns: record(scenario, index, run) });
+        Self { runs: simulated.collect(), settings: scenario.settings().clone() }
+    }
+
+    /// Writes campaign.toml, the recordings and truth.toml into the folder `dir`, which is created if need be.
+    ///
+    /// # Errors
+    /// The first file or folder that cannot be written.
+    pub fn write(&self, dir: impl AsRef<Path>) -> Result<(), WriteError> {
+        let dir = dir.as_ref();
+        fs::create_dir_all(dir).map_err(|source| WriteError { path: dir.to_owned(), source })?;
+        let write = |name: &str, text: &str| {
+            let path = dir.join(name);
+            fs::write(&path, text).map_err(|source| WriteError { path, source })
+        };
+        for run in &self.runs {
+            write(run.run.file(), &run.csv())?;
+        }
+        write("campaign.toml", &self.campaign_toml())?;
+        write("truth.toml", &self.truth_toml())
+    }
+
+    /// The campaign's description.
+    pub fn campaign_toml(&self) -> String {
+        let s = &self.settings;
+        let campaign = Campaign {
+            device: &s.device,
+            instrument: s.instrument,
+            carrier_hz: s.carrier_hz,
+            angular_gain: s.angular_gain_stated,
+            period_deg: (s.instrument == Instrument::Sensor).then_some(360.0),
+        };
+        let runs = s.runs.iter().map(CampaignRun::of).collect();
+        serialised(&CampaignFile { campaign, run: runs })
+    }
+
+    /// What the bench was set to: what an identification should find.
+    pub fn truth_toml(&self) -> String {
+        let s = &self.settings;
+        let mut truth = toml::Table::new();
+        let sensor = s.instrument == Instrument::Sensor;
+        for &id in EffectId::ALL {
+            let description = id.description();
+            if description.declared && (description.in_sensors || !sensor) {
+                let neutral = EffectSetting { id, values: id.neutral() };
+                let set = s.effects.iter().find(|e| e.id == id).unwrap_or(&neutral);
+                for (parameter, value) in set.parameters() {
+                    truth.insert(parameter.name.to_owned(), value.into());
+                }
+            }
+        }
+        truth.insert("angular_gain".to_owned(), s.angular_gain.into());
+        if !sensor {
+            truth.insert("tau_s".to_owned(), s.tau_s.into());
+        }
+        let undeclared = s.effects.iter().filter(|e| !e.id.description().declared);
+        let ids: Vec<toml::Value> = undeclared.map(|e| e.id.description().id.into()).collect();
+        truth.insert("undeclared".to_owned(), ids.into());
+        let effects: Vec<toml::Value> = s.effects.iter().map(|e| toml::Table::from(*e).into()).collect();
+        truth.insert("effect".to_owned(), effects.into());
+        format!("# what the bench was set to\n{}", serialised(&truth))
+    }
+}
+
+fn serialised(value: &impl Serialize) -> String {
+    // strings, numbers and tables only: TOML can hold all of it
+    toml::to_string(value).unwrap_or_else(|e| unreachable!("plain tables serialise: {e}"))
+}
+
+#[derive(Serialize)]
+struct CampaignFile<'a> {
+    campaign: Campaign<'a>,
+    run: Vec<CampaignRun<'a>>,
+}
+
+#[derive(Serialize)]
+struct Campaign<'a> {
+    device: &'a str,
+    instrument: Instrument,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    carrier_hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angular_gain: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    period_deg: Option<f64>,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum CampaignRun<'a> {
+    Rotation {
+        file: &'a str,
+        settle_s: f64,
+        #[serde(rename = "use")]
+        purpose: Purpose,
+        amplitude: f64,
+    },
+    Ringdown {
+        file: &'a str,
+        angle_deg: f64,
+        energy_off_s: f64,
+    },
+}
+
+impl<'a> CampaignRun<'a> {
+    fn of(run: &'a Run) -> Self {
+        match run {
+            Run::Rotation { file, settle_s, purpose, amplitude, .. } => {
+                Self::Rotation { file, settle_s: *settle_s, purpose: *purpose, amplitude: *amplitude }
+            }
+            Run::Ringdown { file, angle_deg, energy_off_s, .. } => {
+                Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s }
+            }
+        }
+    }
+}
+
+/// The columns of one run.
+fn record(scenario: &Scenario, index: usize, run: &Run) -> Vec<Column> {
+    let (count, every) = (scenario.control_samples(run), scenario.control_samples_per_row());
+    let mut rows = Rows::default();
+    if let Some(mut closed) = scenario.closed_loop(index) {
+        for k in 0..count {
+            let table_rad = closed.table_rad();
+            closed.step();
+            if k % every == 0 {
+                let seen = closed.seen();
+                let z = &seen.readout;
+                rows.t_s.push(seen.t_s);
+                rows.rate_dps.push(closed.rate_rad_s().to_degrees());
+                rows.table_deg.push(table_rad.to_degrees());
+                rows.theta_deg.push(seen.compensated.pendulum().angle().to_degrees());
+                for (column, value) in rows.channels.iter_mut().zip([z.x_c, z.x_s, z.y_c, z.y_s, seen.v_as, seen.v_qc])
+                {
+                    column.push(value);
+                }
+            }
+        }
+    } else if let Some((sensor, mut noise)) = scenario.sensor(index) {
+        for reading in sensor.readings(count, every, &mut noise) {
+            let z = &reading.readout;
+            rows.t_s.push(reading.t_s);
+            rows.rate_dps.push(reading.rate_rad_s.to_degrees());
+            rows.table_deg.push(reading.table_rad.to_degrees());
+            rows.theta_deg.push(z.y_c.atan2(z.x_c).to_degrees());
+            for (column, value) in rows.channels.iter_mut().zip([z.x_c, 0.0, z.y_c]) {
+                column.push(value);
+            }
+        }
+    }
+    rows.columns(scenario.settings(), run)
+}
+
+/// A recording while it grows.
+#[derive(Default)]
+struct Rows {
+    t_s: Vec<f64>,
+    rate_dps: Vec<f64>,
+    table_deg: Vec<f64>,
+    theta_deg: Vec<f64>,
+    /// xc, xs, yc, ys, vas, vqc
+    channels: [Vec<f64>; 6],
+}
+
+impl Rows {
+    fn columns(self, s: &Settings, run: &Run) -> Vec<Column> {
+        let reference = match run {
+            Run::Rotation { reference, .. } => *reference,
+            Run::Ringdown { .. } => Reference::Rate,
+        };
+        let sensor = s.instrument == Instrument::Sensor;
+        let temperature =
+            s.temperature.map(|t| self.t_s.iter().map(|time| t.start_c + t.drift_k_per_s * time).collect());
+        let commanded = self.rate_dps.iter().map(|rate| (rate * 1e9).round() / 1e9).collect();
+        let [x_c, x_s, y_c, y_s, v_as, v_qc] = self.channels;
+        let candidates = [
+            ("t_s", true, self.t_s),
+            ("rate_dps", reference != Reference::Table, commanded),
+            ("table_deg", reference != Reference::Rate, self.table_deg),
+            ("xc_v", true, x_c),
+            ("xs_v", !sensor, x_s),
+            ("yc_v", true, y_c),
+            ("ys_v", !sensor, y_s),
+            ("vas_v", !sensor, v_as),
+            ("vqc_v", !sensor, v_qc),
+            ("theta_deg", s.theta_deg, self.theta_deg),
+            ("temp_c", temperature.is_some(), temperature.unwrap_or_default()),
+        ];
+        candidates
+            .into_iter()
+            .filter(|(_, wanted, _)| *wanted)
+            .map(|(name, _, values)| Column { name, values })
+            .collect()
+    }
+}

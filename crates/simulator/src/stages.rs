@@ -1,0 +1,103 @@
+//! A scenario's effects, sorted into the stages where they act and asked, once, how they behave there.
+//!
+//! Linear mechanics and linear drives go into the exact propagation; what follows the table's angle belongs to the
+//! table. Both are found by trying the effect, not by its name, so that a new effect of the library needs no line here.
+
+use cvg_model::effects::{EffectId, Moment, Stage, Values};
+use cvg_model::{AxisForces, Envelope};
+
+/// An effect with the values of its parameters.
+pub type Setting = (EffectId, Values<f64>);
+
+/// Effects by stage, each list in the order of [`EffectId::ALL`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stages {
+    /// on the rate of the table itself
+    pub table: Vec<Setting>,
+    /// on the rate that reaches the instrument, after the table's
+    pub input: Vec<Setting>,
+    /// mechanics that are linear in the envelope
+    pub linear: Vec<Setting>,
+    /// mechanics that are not
+    pub nonlinear: Vec<Setting>,
+    /// on the forces
+    pub actuation: Vec<Setting>,
+    /// on the readout
+    pub readout: Vec<Setting>,
+}
+
+impl Stages {
+    /// Sorts `effects`, given in any order.
+    pub fn new(effects: &[Setting]) -> Self {
+        let mut stages = Self::default();
+        for &id in EffectId::ALL {
+            for setting in effects.iter().filter(|(e, _)| *e == id) {
+                let values = &setting.1;
+                let list = match id.description().stage {
+                    Stage::Input if follows_table(id, values) => &mut stages.table,
+                    Stage::Input => &mut stages.input,
+                    Stage::Mechanics if is_linear(|e| id.mechanics(values, e)) => &mut stages.linear,
+                    Stage::Mechanics => &mut stages.nonlinear,
+                    Stage::Actuation => &mut stages.actuation,
+                    Stage::Readout => &mut stages.readout,
+                };
+                list.push(*setting);
+            }
+        }
+        stages
+    }
+
+    /// The table's own rate and the rate that reaches the instrument, rad/s, when `rate_rad_s` is commanded.
+    #[inline]
+    pub fn rates(&self, rate_rad_s: f64, at: &Moment<f64>) -> (f64, f64) {
+        let through = |list: &[Setting], rate| list.iter().fold(rate, |r, (id, v)| id.input_rate(v, r, at));
+        let table = through(&self.table, rate_rad_s);
+        (table, through(&self.input, table))
+    }
+
+    /// Whether the rate that reaches the instrument is always the commanded one.
+    pub fn rate_is_nominal(&self) -> bool {
+        self.table.is_empty() && self.input.is_empty()
+    }
+
+    /// The forces that the drives make of the commands `f`.
+    #[inline]
+    pub fn actuate(&self, f: AxisForces<f64>) -> AxisForces<f64> {
+        self.actuation.iter().fold(f, |f, (id, v)| id.actuate(v, f))
+    }
+
+    /// The readout of the vibration `e`.
+    #[inline]
+    pub fn read(&self, e: Envelope<f64>, at: &Moment<f64>) -> Envelope<f64> {
+        self.readout.iter().fold(e, |e, (id, v)| id.read(v, e, at))
+    }
+}
+
+/// The rate depends on the table's angle: the effect is the table's own motion, and its angle reference sees it.
+fn follows_table(id: EffectId, values: &Values<f64>) -> bool {
+    let rate = |table_rad| id.input_rate(values, 1.0, &Moment { table_rad, ..Moment::default() });
+    (1..16).any(|i| rate(0.4 * f64::from(i)) != rate(0.0))
+}
+
+/// f is linear: it is the matrix of its values on the four unit envelopes, tried on envelopes of different shapes.
+pub(crate) fn is_linear(f: impl Fn(&Envelope<f64>) -> Envelope<f64>) -> bool {
+    let columns = unit_envelopes().map(|e| f(&e));
+    let trials = [[0.7, -0.1, 0.4, 0.2], [-2.0, 0.3, 1.1, 0.0], [0.01, 0.0, -0.03, 0.02]];
+    trials.iter().all(|t| {
+        let sum = columns.iter().zip(t).fold(Envelope::zero(), |sum, (c, k)| sum + *c * *k);
+        let [x_c, x_s, y_c, y_s] = *t;
+        let off = f(&Envelope::new(x_c, x_s, y_c, y_s)) - sum;
+        let size = |e: &Envelope<f64>| e.pendulum().e.sqrt();
+        size(&off) <= 1e-12 * columns.iter().map(size).sum::<f64>()
+    })
+}
+
+/// The four unit envelopes, in the order x_c, x_s, y_c, y_s.
+pub(crate) fn unit_envelopes() -> [Envelope<f64>; 4] {
+    [
+        Envelope::new(1.0, 0.0, 0.0, 0.0),
+        Envelope::new(0.0, 1.0, 0.0, 0.0),
+        Envelope::new(0.0, 0.0, 1.0, 0.0),
+        Envelope::new(0.0, 0.0, 0.0, 1.0),
+    ]
+}

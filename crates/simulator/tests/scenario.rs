@@ -1,0 +1,226 @@
+//! Scenario files and the campaigns made of them.
+
+mod support;
+
+use approx::assert_abs_diff_eq;
+use cvg_estimator::Period;
+use cvg_simulator::scenario::{PAPER, Purpose, Run, SENSOR};
+use cvg_simulator::{Scenario, SimulatedRun};
+use support::{angles, column, envelopes, fit, only_run};
+
+fn refusal(text: &str) -> String {
+    Scenario::parse(text).map(|_| ()).expect_err("has to be refused").to_string()
+}
+
+fn minimal(keys: &str, run: &str) -> String {
+    format!(
+        "device = \"t\"\nangular_gain = 0.78\n{keys}\n[[run]]\nkind = \"rotation\"\nfile = \"a.csv\"\n\
+         rate_dps = 100.0\nduration_s = 1.0\n{run}\n"
+    )
+}
+
+fn by_file<'a>(runs: &'a [SimulatedRun], file: &str) -> &'a SimulatedRun {
+    runs.iter().find(|r| r.run.file() == file).expect("the run is there")
+}
+
+#[test]
+fn the_papers_scenario_has_the_runs_that_its_method_needs() {
+    let scenario = Scenario::paper();
+    let runs = &scenario.settings().runs;
+    let described: Vec<_> = runs
+        .iter()
+        .map(|run| match run {
+            Run::Rotation { rate_dps, amplitude, purpose, .. } => (*rate_dps, *amplitude, *purpose == Purpose::Fit),
+            Run::Ringdown { angle_deg, .. } => (*angle_deg, 0.0, true),
+        })
+        .collect();
+    assert_eq!(
+        described,
+        [
+            (500.0, 1.0, true),
+            (-500.0, 1.0, true),
+            (200.0, 1.0, true),
+            (60.0, 1.0, true),
+            (500.0, 0.6, true),
+            (350.0, 1.0, false),
+            (-500.0, 1.0, false),
+            (0.0, 0.0, true),
+            (90.0, 0.0, true),
+        ]
+    );
+}
+
+#[test]
+fn one_seed_gives_one_set_of_bytes_and_another_seed_another() {
+    let paper = Scenario::paper();
+    let files = |scenario: &Scenario| scenario.simulate().runs.iter().map(SimulatedRun::csv).collect::<Vec<_>>();
+    assert_eq!(files(&paper), files(&paper));
+    let other = Scenario::parse(&PAPER.replace("seed = 1", "seed = 2")).expect("valid");
+    for (a, b) in files(&paper).iter().zip(files(&other)) {
+        assert_ne!(*a, b);
+    }
+}
+
+#[test]
+fn a_run_does_not_depend_on_the_runs_before_it() {
+    let paper = Scenario::paper();
+    let mut settings = paper.settings().clone();
+    settings.runs.truncate(2);
+    let fewer = Scenario::new(settings).expect("valid");
+    assert_eq!(paper.simulate().runs[1], fewer.simulate().runs[1]);
+}
+
+#[test]
+fn a_campaign_is_written_as_a_folder_that_says_what_is_in_it() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let target = dir.path().join("deep/er");
+    let simulated = Scenario::paper().simulate();
+    simulated.write(&target).expect("written");
+    simulated.write(&target).expect("written over");
+    let campaign: toml::Table =
+        std::fs::read_to_string(target.join("campaign.toml")).expect("there").parse().expect("TOML");
+    let runs = campaign["run"].as_array().expect("runs");
+    assert_eq!(campaign["campaign"]["device"].as_str(), Some("dfp-paper"));
+    assert_eq!(campaign["campaign"]["angular_gain"].as_float(), Some(0.8));
+    assert_eq!(runs.len(), 9);
+    for run in runs {
+        let text = std::fs::read_to_string(target.join(run["file"].as_str().expect("a name"))).expect("there");
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("t_s,rate_dps,xc_v,xs_v,yc_v,ys_v,vas_v,vqc_v"));
+        for line in lines {
+            assert_eq!(line.split(',').filter(|cell| cell.parse::<f64>().is_ok()).count(), 8);
+        }
+    }
+    let truth: toml::Table = std::fs::read_to_string(target.join("truth.toml")).expect("there").parse().expect("TOML");
+    assert_eq!(truth["detection_gain_ratio"].as_float(), Some(1.0132));
+    assert_eq!(truth["actuation_gain_ratio"].as_float(), Some(1.0113));
+    assert_eq!(truth["undeclared"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
+fn what_is_written_is_what_was_simulated_to_nine_digits() {
+    let simulated = Scenario::paper().simulate();
+    let run = &simulated.runs[0];
+    for (row, line) in run.csv().lines().skip(1).enumerate() {
+        for (cell, column) in line.split(',').zip(&run.columns) {
+            let value: f64 = cell.parse().expect("a number");
+            assert_abs_diff_eq!(value, column.values[row], epsilon = 1e-8);
+        }
+    }
+}
+
+#[test]
+fn a_row_holds_the_readout_and_the_commands_computed_from_it() {
+    // Equation 3 between neighbouring rows, recorded at every control sample
+    let run = only_run(&minimal("control_hz = 1000.0\nsample_hz = 1000.0\nnoise_v = 1e-4", ""));
+    let q: Vec<f64> = envelopes(&run).iter().map(|e| e.pendulum().q).collect();
+    let (v, omega, damping) = (column(&run, "vqc_v"), core::f64::consts::TAU, 0.7);
+    for i in 1..q.len() {
+        let proportional = damping * omega * (q[i] - q[i - 1]);
+        let integral = 0.5 * omega * omega * 1e-3 * q[i];
+        assert_abs_diff_eq!(v[i] - v[i - 1], -(proportional + integral), epsilon = 1e-12);
+    }
+}
+
+#[test]
+fn compensation_in_the_loop_takes_the_errors_out_of_the_true_motion() {
+    let effects = r#"{ id = "detection-gain-mismatch", detection_gain_ratio = 1.05 },
+                     { id = "actuation-gain-mismatch", actuation_gain_ratio = 1.04 }"#;
+    let keys = format!("theta_deg = true\nwarm_up_s = 2.0\neffects = [{effects}]\ncompensation = [{effects}]");
+    let run = only_run(&minimal(&keys, ""));
+    for v_as in column(&run, "vas_v") {
+        assert_abs_diff_eq!(*v_as, -0.5 * (1.04_f64.sqrt() + 1.0 / 1.04_f64.sqrt()) / 22.0, epsilon = 2e-3);
+    }
+    // the readout is recorded as it came, the instrument's own angle is compensated
+    let energies: Vec<f64> = envelopes(&run).iter().map(|e| e.pendulum().e).collect();
+    assert!(energies.iter().any(|e| *e > 1.05));
+    let t = column(&run, "t_s");
+    let own: Vec<f64> = column(&run, "theta_deg").iter().map(|d| (2.0 * d).to_radians().cos()).collect();
+    let doubled: Vec<f64> = t.iter().map(|t| -2.0 * 0.78 * 100_f64.to_radians() * t).collect();
+    let ideal = fit(&own, &[], &doubled, &[1.0]).1[0];
+    assert_abs_diff_eq!(ideal.amplitude(), 1.0, epsilon = 1e-4);
+}
+
+#[test]
+fn force_noise_makes_the_angle_walk() {
+    let spread = |keys: &str| {
+        let run = only_run(&minimal(keys, ""));
+        let theta = angles(&run, Period::Pattern);
+        let t = column(&run, "t_s");
+        theta.iter().zip(t).map(|(a, t)| (a - theta[0] + 0.78 * 100_f64.to_radians() * t).abs()).fold(0.0, f64::max)
+    };
+    // held for a period, the energy command lags by half of it: a precession of ½kΩT/τ, and nothing else
+    assert!(spread("") < 0.6 * 0.78 * 100_f64.to_radians() * 5e-4 / 22.0);
+    assert!(spread("force_noise_v = 0.1") > 5e-4);
+}
+
+#[test]
+fn the_sensors_scenario_turns_there_and_back_and_reads_without_loops() {
+    let simulated = Scenario::parse(SENSOR).expect("valid").simulate();
+    let turns = by_file(&simulated.runs, "turns.csv");
+    let names: Vec<_> = turns.columns.iter().map(|c| c.name).collect();
+    assert_eq!(names, ["t_s", "rate_dps", "table_deg", "xc_v", "yc_v"]);
+    let table = column(turns, "table_deg");
+    assert_abs_diff_eq!(table[table.len() / 2], 360.0, epsilon = 1e-6);
+    assert_abs_diff_eq!(*table.last().expect("rows"), 0.06, epsilon = 1e-6);
+    // 25 pole pairs turn with the table: once the ellipse is made a circle, 25 turns of the table's one
+    let campaign: toml::Table = simulated.campaign_toml().parse().expect("TOML");
+    assert_eq!(campaign["campaign"]["instrument"].as_str(), Some("sensor"));
+    assert_eq!(campaign["campaign"]["period_deg"].as_float(), Some(360.0));
+}
+
+#[test]
+fn a_perfect_sensor_reads_its_table() {
+    let text = minimal("instrument = \"sensor\"\nnoise_v = 0.0", "reference = \"table\"")
+        .replace("angular_gain = 0.78", "angular_gain = -3.0");
+    let run = only_run(&text);
+    let theta = angles(&run, Period::FullTurn);
+    for (angle, table) in theta.iter().zip(column(&run, "table_deg")) {
+        assert_abs_diff_eq!((angle - theta[0]).to_degrees(), 3.0 * table, epsilon = 1e-6);
+    }
+}
+
+#[test]
+fn the_loop_locks_to_a_detuned_reference() {
+    let run = only_run(&minimal("detuning_hz = 2.0\nwarm_up_s = 2.0", ""));
+    for e in envelopes(&run) {
+        assert!(e.pendulum().l.abs() < 1e-6);
+    }
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_with_the_key_and_what_would_be_right() {
+    for (text, wanted) in [
+        (minimal("tau = 3.0", ""), "unknown field `tau`"),
+        (minimal("", "speed = 3"), "unknown field `speed`"),
+        (minimal("tau_s = -1.0", ""), "tau_s: -1 has to be finite and positive"),
+        (minimal("noise_v = nan", ""), "noise_v: NaN has to be finite and not negative"),
+        (minimal("sample_hz = 300.0", ""), "sample_hz: 300 does not divide control_hz = 2000"),
+        (minimal("effects = [{ id = \"gain\" }]", ""), "no effect is called \"gain\""),
+        (minimal("effects = [{ id = \"detection-skew\", s = 1.0 }]", ""), "detection-skew has no parameter \"s\""),
+        (minimal("effects = [{ id = \"detection-skew\", skew = 9.0 }]", ""), "skew = 9 is outside [-2, 2]"),
+        (minimal("effects = [{ id = \"detection-skew\", skew = \"a\" }]", ""), "skew has to be a number"),
+        (minimal("effects = [{ id = \"harmonic-n\", amplitude = 0.1 }]", ""), "harmonic-n needs n"),
+        (minimal("effects = [{ id = \"spring-cubic\", phase = 0.1 }]", ""), "phase is given without p"),
+        (minimal("compensation = [{ id = \"anisodamping\" }]", ""), "the electronics cannot undo it"),
+        (
+            minimal("instrument = \"sensor\"\neffects = [{ id = \"anisodamping\" }]", ""),
+            "a sensor cannot have anisodamping",
+        ),
+        (minimal("loops = { energy = { bandwidth_hz = 500.0, damping = 1.0 } }", ""), "loops.energy: bandwidth_rad_s"),
+        (minimal("", "").replace("a.csv", "../a.csv"), "is not a plain name"),
+        (minimal("", "").replace("duration_s = 1.0", "duration_s = 0.0"), "run \"a.csv\": duration_s: 0 has to be"),
+        ("device = \"t\"\nangular_gain = 0.0\nrun = []\n".to_owned(), "angular_gain: is 0"),
+        ("device = \"t\"\nangular_gain = 0.7\nrun = []\n".to_owned(), "at least one [[run]]"),
+    ] {
+        let error = refusal(&text);
+        assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");
+    }
+}
+
+#[test]
+fn settings_survive_being_written_and_read() {
+    let paper = Scenario::paper();
+    let text = toml::to_string(paper.settings()).expect("serialises");
+    assert_eq!(Scenario::parse(&text).expect("valid").settings(), paper.settings());
+}

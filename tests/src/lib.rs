@@ -1,0 +1,63 @@
+//! What the evidence has in common: the domains the instrument is tested on, the tolerances it is held to, and the
+//! scalars every equation runs in.
+//!
+//! One file of `tests/` is one equation of the paper, one view of the mechanics, or one promise of the repository. The
+//! prefix of a test says what kind of evidence it is: `prop_` holds over a whole domain, `paper_` reproduces a number
+//! that the paper states, `snapshot_` keeps a table of derived values from changing unseen.
+#![forbid(unsafe_code)]
+
+pub mod domain;
+pub mod scalar;
+pub mod tolerances;
+
+#[doc(no_inline)]
+pub use cvg_model as model;
+pub use scalar::Scalar;
+pub use tolerances::Tolerance;
+
+use proptest::test_runner::{Config, FileFailurePersistence};
+
+/// How the random tests run: a counter-example that was found once is kept beside the test and tried first.
+pub fn config() -> Config {
+    Config {
+        failure_persistence: Some(Box::new(FileFailurePersistence::WithSource("regressions"))),
+        max_global_rejects: 1 << 20,
+        ..Config::default()
+    }
+}
+
+/// Runs the properties inside for `T = f64` and for `T = f32`.
+#[macro_export]
+macro_rules! for_each_scalar {
+    ($($properties:tt)*) => {
+        mod in_f64 {
+            use super::*;
+            #[allow(unused_imports, reason = "not every file needs every conversion")]
+            use $crate::{Scalar as _, model::Float as _};
+            type T = f64;
+            proptest::proptest! { #![proptest_config($crate::config())] $($properties)* }
+        }
+        mod in_f32 {
+            use super::*;
+            #[allow(unused_imports, reason = "not every file needs every conversion")]
+            use $crate::{Scalar as _, model::Float as _};
+            type T = f32;
+            proptest::proptest! { #![proptest_config($crate::config())] $($properties)* }
+        }
+    };
+}
+
+/// `actual` is within `tolerance` of `expected` (both as `f64`), or the test fails and shows all three.
+#[macro_export]
+macro_rules! prop_assert_near {
+    ($actual:expr, $expected:expr, $tolerance:expr) => {{
+        let (actual, expected, tolerance): (f64, f64, f64) = ($actual, $expected, $tolerance);
+        proptest::prop_assert!(
+            (actual - expected).abs() <= tolerance,
+            "{} = {actual:e}, but {} = {expected:e}: apart by {:e}, allowed {tolerance:e}",
+            stringify!($actual),
+            stringify!($expected),
+            (actual - expected).abs(),
+        );
+    }};
+}
