@@ -6,6 +6,7 @@
 //! that the paper states, `snapshot_` keeps a table of derived values from changing unseen.
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod domain;
 pub mod scalar;
 pub mod tolerances;

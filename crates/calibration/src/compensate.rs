@@ -6,7 +6,7 @@ use cvg_model::effects::Moment;
 use crate::calibration::Calibration;
 use crate::error::Refusal;
 use crate::hypothesis::Unknowns;
-use crate::pass::{Start, walk};
+use crate::pass::{Pace, Start, walk};
 use crate::recording::{Recording, Role, Run, RunKind};
 use crate::track::{Track, wrapped};
 
@@ -32,7 +32,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let none = Unknowns::new(h, Vec::new());
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     for segment in &track.segments {
-        walk(&track, segment, h, &none, Start::default(), 1, |row| {
+        walk(&track, segment, h, &none, Start::default(), Pace::every(1), |row| {
             let i = row.index;
             let at = Moment {
                 t_s: track.t_s[i],

@@ -92,7 +92,13 @@ pub(crate) fn discover(
     }
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
-        let Some((next, step)) = best_step(bench, &fitted)? else { break };
+        let Some((next, step)) = best_step(bench, &fitted)? else {
+            // trials leave the runs as their own fits had them
+            if bench.disturbed(&fitted.fit) {
+                fitted = fit_with_ring_downs(bench, &fitted.fit.hypothesis)?;
+            }
+            break;
+        };
         fitted = next;
         steps.push(step);
     }
@@ -184,29 +190,27 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
         t.gain = n * (mean_square(&base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
     }
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let (chosen, origin, confounded_with) = match choose(&trials, bench.tracks_differ()) {
-        Some(choice) => choice,
-        None => return Ok(None),
-    };
-    let chosen = chosen.clone();
-    let rivals =
-        trials.iter().filter(|t| t.candidate != chosen.candidate).map(|t| (t.candidate.id, t.gain)).take(3).collect();
     let heldout_before = heldout(bench, &fitted.fit);
-    let extended = extend_from(&chosen, origin);
-    let next = fit_with_ring_downs(bench, &extended)?;
-    let heldout_after = heldout(bench, &next.fit);
-    if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before {
-        return Ok(None);
+    while let Some((chosen, origin, confounded_with)) = choose(&trials, bench.tracks_differ()) {
+        let chosen = chosen.clone();
+        let next = fit_with_ring_downs(bench, &extend_from(&chosen, origin))?;
+        let heldout_after = heldout(bench, &next.fit);
+        trials.retain(|t| t.candidate != chosen.candidate);
+        if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before {
+            // gained on the fitted data only: the next one's turn
+            continue;
+        }
+        let step = Step {
+            id: chosen.candidate.id,
+            origin,
+            gain: chosen.gain,
+            rivals: trials.iter().map(|t| (t.candidate.id, t.gain)).take(3).collect(),
+            heldout_rms_deg: [heldout_before, heldout_after].map(|square| square.sqrt().to_degrees()),
+            confounded_with,
+        };
+        return Ok(Some((next, step)));
     }
-    let step = Step {
-        id: chosen.candidate.id,
-        origin,
-        gain: chosen.gain,
-        rivals,
-        heldout_rms_deg: [heldout_before.sqrt().to_degrees(), heldout_after.sqrt().to_degrees()],
-        confounded_with,
-    };
-    Ok(Some((next, step)))
+    Ok(None)
 }
 
 /// The winner among refitted candidates, and in what capacity it comes in.

@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::hypothesis::{Hypothesis, Unknown, Unknowns, direction};
-use crate::pass::{Start, walk};
+use crate::pass::{Pace, Start, walk};
 use crate::recording::Role;
+use crate::statistics::circular_mean;
 use crate::track::{Segment, Track};
 
 /// A Gaussian belief about an unknown before the data.
@@ -158,6 +159,8 @@ impl Effort {
 
 /// More than this share of the samples cannot be spikes.
 const LARGEST_SET_ASIDE: f64 = 0.2;
+/// Limits of spikes are not widened beyond this factor.
+const WIDEST: f64 = 1e6;
 /// A step is the last when no unknown moves by more than this share of its standard deviation.
 const CONVERGED: f64 = 0.02;
 
@@ -187,7 +190,8 @@ pub(crate) fn fit(
         unknowns.iter().map(|u| priors.iter().find(|p| p.considered && p.unknown == *u).map(|p| p.deviation)).collect();
     let (mut widened, mut damping, mut polishing) = (1.0, 0.0, false);
     let mut best: Option<Linearised> = None;
-    for step_number in 0..effort.steps {
+    let mut step_number = 0;
+    while step_number < effort.steps {
         let stride = |p: &Prepared| {
             if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, role, effort) }
         };
@@ -198,11 +202,12 @@ pub(crate) fn fit(
             .collect();
         let here = Linearised::new(&result, sums, priors, n);
         let far_off = here.set_aside as f64 > LARGEST_SET_ASIDE * (here.set_aside + here.counted[0]) as f64;
-        if far_off && best.is_none() {
+        if far_off && best.is_none() && widened < WIDEST {
             // Not spikes but a hypothesis that does not fit yet: look at more of the data.
             widened *= 4.0;
             continue;
         }
+        step_number += 1;
         // Levenberg and Marquardt: a step that made things worse is taken back and shortened.
         let worse = far_off || best.as_ref().is_some_and(|b| here.mean_square() > b.mean_square() * (1.0 + 1e-9));
         let (from, last) = match (worse && !polishing, best.take()) {
@@ -228,7 +233,7 @@ pub(crate) fn fit(
         if last {
             break;
         }
-        if (small && damping == 0.0) || step_number + 2 >= effort.steps {
+        if (small && damping == 0.0) || step_number + 1 >= effort.steps {
             if !effort.polish {
                 break;
             }
@@ -333,7 +338,8 @@ fn collect(
         .map(|(segment, start)| {
             let mut sums = Sums::new(unknowns.all.len());
             if segment.role == role {
-                walk(track, segment, hypothesis, unknowns, *start, stride, |row| {
+                let pace = Pace { stride, spike: limit.angle };
+                walk(track, segment, hypothesis, unknowns, *start, pace, |row| {
                     if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
                         Sums::add(&mut sums.angle, weights[0], row.angle_slopes, row.angle);
                         sums.counted[0] += worth;
@@ -447,7 +453,16 @@ pub(crate) fn residuals(
                 if segment.role == role {
                     let (segment, stride) = window.of(track, segment);
                     let mut r = Residual::new(number, &segment);
-                    walk(track, &segment, hypothesis, &none, *start, stride, |row| r.push(track, row));
+                    let mut start = *start;
+                    if role == Role::Holdout {
+                        // nothing was fitted here: where the segment starts is found first
+                        let mut angles = Vec::new();
+                        let coarse = Pace::every(stride * (segment.range.len() / (stride * 500)).max(1));
+                        walk(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
+                        start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
+                    }
+                    let pace = Pace { stride, spike: prepared.limit.angle };
+                    walk(track, &segment, hypothesis, &none, start, pace, |row| r.push(track, row));
                     out.push(r);
                 }
             }
@@ -504,7 +519,8 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
             for (segment, start) in prepared.track.segments.iter().zip(starts).filter(|(s, _)| s.role == role) {
                 let mut angle = Scores::new(n);
                 let mut amplitude = Scores::new(n);
-                walk(&prepared.track, segment, &fit.hypothesis, &sorted, *start, prepared.track.stride, |row| {
+                let pace = Pace { stride: prepared.track.stride, spike: prepared.limit.angle };
+                walk(&prepared.track, segment, &fit.hypothesis, &sorted, *start, pace, |row| {
                     if row.angle.abs() <= prepared.limit.angle {
                         angle.add(prepared.noise.angle.powi(-2), row.angle, row.angle_slopes);
                         amplitude.add(prepared.noise.amplitude.powi(-2), row.amplitude, row.amplitude_slopes);

@@ -7,10 +7,10 @@ use crate::actuation::{DriveGains, RingDown, ring_down};
 use crate::error::Refusal;
 use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
 use crate::hypothesis::{Hypothesis, Origin, Unknown, Unknowns};
-use crate::pass::walk;
+use crate::pass::{Pace, walk};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 use crate::start::{Ellipse, motion};
-use crate::statistics::{robust_deviation, white_noise};
+use crate::statistics::{median, robust_deviation, white_noise};
 use crate::track::Track;
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
@@ -145,7 +145,7 @@ impl Bench {
     /// What the commands do beside their scale is left alone unless runs at two or more rates, or in both directions,
     /// can tell it from the rest.
     pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
-        self.unknowns_of(hypothesis, self.tracks_differ())
+        self.unknowns_of(hypothesis, self.tracks_differ() && self.excess() < LARGEST_EXCESS)
     }
 
     fn unknowns_of(&self, hypothesis: &Hypothesis, drive: bool) -> Vec<Unknown> {
@@ -178,6 +178,17 @@ impl Bench {
             p.starts = motion.starts;
         }
         Ok(())
+    }
+
+    /// The runs were left by another fit than this.
+    pub(crate) fn disturbed(&self, fit: &Fit) -> bool {
+        self.tracks.iter().zip(&fit.starts).any(|(p, s)| p.starts != *s)
+    }
+
+    /// By what factor the residuals exceed their white part: the median over fitted tracks.
+    fn excess(&self) -> f64 {
+        let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
+        median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
     }
 
     /// Fitted runs were made at two or more rates, or in both directions.
@@ -263,7 +274,11 @@ impl Bench {
                 let stride = p.track.stride;
                 let mut last: Option<(f64, [f64; 3])> = None;
                 let (mut sums, mut rows) = ([0.0; 3], Vec::new());
-                walk(&p.track, segment, hypothesis, &none, *start, stride, |row| {
+                let pace = Pace { stride, spike: p.limit.angle };
+                walk(&p.track, segment, hypothesis, &none, *start, pace, |row| {
+                    if row.angle.abs() > pace.spike {
+                        return;
+                    }
                     let pendulum = row.vibration.pendulum();
                     let line = pendulum.r.hypot(pendulum.s);
                     let Some(v) = p.track.commands(row.index, stride).filter(|_| line > 0.0) else { return };
@@ -358,6 +373,8 @@ pub(crate) fn declared_hypothesis(start: &Hypothesis) -> Hypothesis {
     hypothesis
 }
 
+/// A residual beyond this multiple of its white part is a misfit.
+const LARGEST_EXCESS: f64 = 4.0;
 /// Rounds of fit, noise and spikes.
 const ROUNDS: usize = 3;
 
@@ -388,8 +405,10 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
         }
         bench.balance_quadrature(&hypothesis);
         let last = round + 1 == ROUNDS;
-        // What the commands do is adjusted last: it multiplies, and a misfit would drag it along.
-        let unknowns = bench.unknowns_of(&hypothesis, last && bench.tracks_differ());
+        // What the commands do is adjusted last, and only when little else is left: it multiplies, and a misfit would
+        // drag it along.
+        let free_drive = last && bench.tracks_differ() && bench.excess() < LARGEST_EXCESS;
+        let unknowns = bench.unknowns_of(&hypothesis, free_drive);
         let priors = bench.priors(&hypothesis, drive.as_ref());
         let effort = if last { Effort::FULL } else { Effort::ROUGH };
         let result = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, effort);

@@ -10,6 +10,7 @@ use cvg_model::effects::Moment;
 
 use crate::hypothesis::{Hypothesis, Unknowns, Vibration, quantity};
 use crate::jet::Jet;
+use crate::recording::Instrument;
 use crate::track::{Segment, Track, wrapped};
 
 /// What a pass says of one sample.
@@ -44,16 +45,33 @@ pub(crate) struct Start {
     pub(crate) amplitude: f64,
 }
 
-/// Walks `segment` in steps of `stride` samples and hands each row to `take`.
+/// How a segment is walked.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pace {
+    /// every how many samples
+    pub(crate) stride: usize,
+    /// a residual of the angle beyond this, rad, is a spike: the integrals pass over its sample
+    pub(crate) spike: f64,
+}
+
+impl Pace {
+    /// Every `stride` samples, all believed.
+    pub(crate) fn every(stride: usize) -> Self {
+        Self { stride, spike: f64::INFINITY }
+    }
+}
+
+/// Walks `segment` and hands each row to `take`.
 pub(crate) fn walk(
     track: &Track,
     segment: &Segment,
     hypothesis: &Hypothesis,
     unknowns: &Unknowns,
     start: Start,
-    stride: usize,
+    pace: Pace,
     mut take: impl FnMut(&Row<'_>),
 ) {
+    let stride = pace.stride;
     let n = unknowns.all.len();
     let mut vibration = Vibration::new();
     // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
@@ -70,14 +88,13 @@ pub(crate) fn walk(
         let at =
             Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: hypothesis.precession(rate) };
         hypothesis.evaluate(track.envelope(i), track.commands(i, stride), &at, unknowns, &mut vibration);
-        if hypothesis.instrument == crate::recording::Instrument::Gyroscope {
+        if hypothesis.instrument == Instrument::Gyroscope {
             integrands[0] = vibration.theta_rate;
             integrands[n + 1] = vibration.growth;
             for (u, s) in vibration.slopes.iter().enumerate() {
                 integrands[1 + u] = s[quantity::THETA_RATE];
                 integrands[n + 2 + u] = s[quantity::GROWTH];
             }
-            integrals.extend_to(track.t_s[i], &integrands);
         }
         if let Some(from) = last.filter(|_| harmonic > 0.0) {
             excess = excess + excess_angle(track, from, i, hypothesis, unknowns, harmonic);
@@ -85,7 +102,12 @@ pub(crate) fn walk(
         last = Some(i);
         let turned = track.input_rad[i] - zero_input;
         let input = turned + excess.value;
-        let predicted = start.angle + sense * hypothesis.angular_gain * input + integrals.sum[0];
+        let along = start.angle + sense * hypothesis.angular_gain * input;
+        let off = wrapped(vibration.theta - along - integrals.sum[0], hypothesis.period_rad);
+        if hypothesis.instrument == Instrument::Gyroscope && (off.abs() <= pace.spike || integrals.known == 0) {
+            integrals.extend_to(track.t_s[i], &integrands);
+        }
+        let predicted = along + integrals.sum[0];
         let ln_a = start.amplitude + integrals.sum[n + 1];
         for (u, s) in vibration.slopes.iter().enumerate() {
             angle_slopes[u] = integrals.sum[1 + u] - s[quantity::THETA];

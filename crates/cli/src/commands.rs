@@ -121,7 +121,10 @@ pub(crate) fn summary(identified: &Identification) -> String {
     line(format!("  detection gain G_Dy/G_Dx    {}", estimate(&r.detection_gain_ratio)));
     line(format!("  actuation gain G_Ax/G_Ay    {}", estimate(&r.actuation_gain_ratio)));
     for e in &r.effects {
-        let parameters = e.parameters.iter().map(|p| format!("{} = {:.6} {}", p.name, p.value, p.unit));
+        let parameters = e.parameters.iter().map(|p| {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            format!("{} = {} {unit}", p.name, significant(p.value)).trim_end().to_owned()
+        });
         let origin = format!("{:?}", e.origin).to_lowercase();
         line(format!("  {:<11} {:<26} {}", origin, e.id, parameters.collect::<Vec<_>>().join(", ")));
     }
@@ -134,4 +137,16 @@ pub(crate) fn summary(identified: &Identification) -> String {
         line(format!("  warning: {w}"));
     }
     s
+}
+
+/// A value with some six significant digits.
+pub(crate) fn significant(value: f64) -> String {
+    let size = value.abs();
+    if value == value.trunc() && size < 1e6 {
+        format!("{value}")
+    } else if (1e-2..1e4).contains(&size) {
+        format!("{value:.6}")
+    } else {
+        format!("{value:.5e}")
+    }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use cvg_calibration::report::{Estimate, Report};
 use cvg_calibration::{Identification, Origin};
 
+use crate::commands::significant;
 use crate::figure::{BLUE, GREEN, Series, VERMILLION, plot};
 use crate::{Failure, commands};
 
@@ -167,8 +168,9 @@ fn effects(h: &mut String, r: &Report) {
             .parameters
             .iter()
             .map(|p| {
-                let ci = p.ci95.map(|c| format!(" ({:.6} … {:.6})", c[0], c[1])).unwrap_or_default();
-                format!("{} = {:.6} {}{ci}", escape(&p.name), p.value, escape(&p.unit))
+                let ci =
+                    p.ci95.map(|c| format!(" ({} … {})", significant(c[0]), significant(c[1]))).unwrap_or_default();
+                format!("{} = {} {}{ci}", escape(&p.name), significant(p.value), escape(&p.unit))
             })
             .collect::<Vec<_>>()
             .join("<br>");

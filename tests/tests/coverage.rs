@@ -1,0 +1,132 @@
+//! A 95 % interval holds the truth in 95 % of repeated simulations.
+//!
+//! The paper's campaign with random mismatches, mechanics and noise, and nothing undeclared in it. `CVG_TRIALS` says how
+//! many; the full run is `CVG_TRIALS=300 cargo test --release -p cvg-tests --test coverage -- --nocapture`.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::f64::consts::TAU;
+
+use cvg_calibration::Origin;
+use cvg_calibration::report::Estimate;
+use cvg_model::effects::EffectId;
+use cvg_simulator::Settings;
+use cvg_tests::bench::{
+    Draws, all, deviations, effect, found, holds, identify, over_floor, plain_paper, polar, trials,
+};
+
+/// Trials without `CVG_TRIALS`.
+const TRIALS: u64 = 24;
+/// What a 95 % interval may hold in the long run.
+const LOWEST_COVERAGE: f64 = 0.92;
+const HIGHEST_COVERAGE: f64 = 0.98;
+/// How rarely an interval of that coverage fails this test.
+const LEVEL: f64 = 1e-3;
+
+const PARAMETERS: [&str; 3] = ["detection ratio", "actuation ratio", "angular gain"];
+
+/// A device like the paper's, and its detection ratio, actuation ratio and angular gain.
+fn device(seed: u64) -> (Settings, [f64; 3]) {
+    let mut draw = Draws::new(seed);
+    let mut settings = plain_paper();
+    let truth = [draw.between(0.97, 1.03), draw.between(0.97, 1.03), draw.between(0.74, 0.82)];
+    settings.seed = seed;
+    settings.angular_gain = truth[2];
+    settings.noise_v = draw.scale(1e-5, 1e-4);
+    settings.effects = vec![
+        polar(EffectId::Anisodamping, draw.between(0.0, 0.01), draw.angle_deg(), 2.0),
+        polar(EffectId::Anisoelasticity, TAU * draw.between(0.0, 0.05), draw.angle_deg(), 2.0),
+        effect(EffectId::ActuationGainMismatch, &[truth[1]]),
+        effect(EffectId::DetectionGainMismatch, &[truth[0]]),
+    ];
+    (settings, truth)
+}
+
+/// What one trial answered: the three estimates, what was claimed beyond the truth, and the held-out error.
+struct Answer {
+    estimates: [Option<Estimate>; 3],
+    truth: [f64; 3],
+    claimed: Vec<String>,
+    over_floor: f64,
+}
+
+fn answer(seed: u64) -> Answer {
+    let (settings, truth) = device(seed);
+    let identified = identify(settings).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+    let claimed = [Origin::Discovered, Origin::Empirical].map(|o| found(&identified, o)).concat();
+    let r = &identified.report;
+    Answer {
+        estimates: [r.detection_gain_ratio, r.actuation_gain_ratio, Some(r.angular_gain)],
+        truth,
+        claimed: claimed.into_iter().map(str::to_owned).collect(),
+        over_floor: over_floor(&identified),
+    }
+}
+
+/// The smallest count that repetitions do not exceed with a probability of at least `level`.
+fn binomial_quantile(trials: u64, probability: f64, level: f64) -> u64 {
+    // in logarithms: the first terms are too small for a number
+    let mut term_ln = trials as f64 * (1.0 - probability).ln();
+    let mut sum = 0.0;
+    for k in 0..=trials {
+        sum += term_ln.exp();
+        if sum >= level * (1.0 - 1e-9) {
+            return k;
+        }
+        term_ln += ((trials - k) as f64 / (k + 1) as f64 * probability / (1.0 - probability)).ln();
+    }
+    trials
+}
+
+#[test]
+fn a_binomial_quantile_is_where_its_tail_says() {
+    assert_eq!(binomial_quantile(10, 0.5, 0.5), 5);
+    assert_eq!(binomial_quantile(10, 0.5, 1.0 / 1024.0), 0);
+    assert_eq!(binomial_quantile(10, 0.5, 12.0 / 1024.0), 2);
+    assert_eq!(binomial_quantile(3000, 0.5, 0.5), 1500);
+}
+
+#[test]
+fn intervals_hold_the_truth_as_often_as_they_say() {
+    let count = trials(TRIALS);
+    let answers = all(count, answer);
+    println!("{count} trials          held  share    width (median)   mean of z  its deviation   largest |z|");
+    let mut failures = Vec::new();
+    for (p, name) in PARAMETERS.iter().enumerate() {
+        let told: Vec<(&Estimate, f64)> =
+            answers.iter().filter_map(|a| a.estimates[p].as_ref().map(|e| (e, a.truth[p]))).collect();
+        let held = told.iter().filter(|(e, truth)| holds(e, *truth)).count() as u64;
+        let n = told.len() as f64;
+        let z: Vec<f64> = told.iter().map(|(e, truth)| deviations(e, *truth)).collect();
+        let mean = z.iter().sum::<f64>() / n;
+        let deviation = (z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let largest = z.iter().fold(0.0_f64, |m, z| m.max(z.abs()));
+        let mut widths: Vec<f64> = told.iter().map(|(e, _)| e.half_width()).collect();
+        widths.sort_by(f64::total_cmp);
+        println!(
+            "  {name:<18} {held:>4}  {:.3}    ± {:.2e}       {mean:+.3}     {deviation:.3}           {largest:.2}",
+            held as f64 / n,
+            widths[widths.len() / 2]
+        );
+        let lowest = binomial_quantile(count, LOWEST_COVERAGE, LEVEL);
+        let highest = binomial_quantile(count, HIGHEST_COVERAGE, 1.0 - LEVEL);
+        if told.len() as u64 != count {
+            failures.push(format!("{name}: {} of {count} campaigns gave no answer", count - told.len() as u64));
+        }
+        if !(lowest..=highest).contains(&held) {
+            failures
+                .push(format!("{name}: {held} of {count} intervals hold the truth, expected {lowest} to {highest}"));
+        }
+    }
+    let claims: Vec<String> = answers
+        .iter()
+        .enumerate()
+        .filter(|(_, a)| !a.claimed.is_empty())
+        .map(|(seed, a)| format!("seed {seed}: {}", a.claimed.join(", ")))
+        .collect();
+    let worst = answers.iter().map(|a| a.over_floor).fold(0.0, f64::max);
+    println!(
+        "  effects claimed where none is: {}{claims:?}; worst held-out error over the floor {worst:.3}",
+        claims.len()
+    );
+    assert!(failures.is_empty(), "{failures:#?}");
+}
