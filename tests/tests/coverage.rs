@@ -21,6 +21,8 @@ const LOWEST_COVERAGE: f64 = 0.92;
 const HIGHEST_COVERAGE: f64 = 0.98;
 /// How rarely an interval of that coverage fails this test.
 const LEVEL: f64 = 1e-3;
+/// Errors that are printed one by one, in standard deviations.
+const FAR: f64 = 3.0;
 
 const PARAMETERS: [&str; 3] = ["detection ratio", "actuation ratio", "angular gain"];
 
@@ -45,18 +47,21 @@ fn device(seed: u64) -> (Settings, [f64; 3]) {
 struct Answer {
     estimates: [Option<Estimate>; 3],
     truth: [f64; 3],
+    noise_v: f64,
     claimed: Vec<String>,
     over_floor: f64,
 }
 
 fn answer(seed: u64) -> Answer {
     let (settings, truth) = device(seed);
+    let noise_v = settings.noise_v;
     let identified = identify(settings).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
     let claimed = [Origin::Discovered, Origin::Empirical].map(|o| found(&identified, o)).concat();
     let r = &identified.report;
     Answer {
         estimates: [r.detection_gain_ratio, r.actuation_gain_ratio, Some(r.angular_gain)],
         truth,
+        noise_v,
         claimed: claimed.into_iter().map(str::to_owned).collect(),
         over_floor: over_floor(&identified),
     }
@@ -115,6 +120,13 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
         if !(lowest..=highest).contains(&held) {
             failures
                 .push(format!("{name}: {held} of {count} intervals hold the truth, expected {lowest} to {highest}"));
+        }
+    }
+    for (seed, a) in answers.iter().enumerate() {
+        for ((name, estimate), truth) in PARAMETERS.iter().zip(&a.estimates).zip(a.truth) {
+            if let Some(z) = estimate.map(|e| deviations(&e, truth)).filter(|z| z.abs() > FAR) {
+                println!("  seed {seed}: {name} is {z:+.2} deviations off; noise {:.1e} V", a.noise_v);
+            }
         }
     }
     let claims: Vec<String> = answers

@@ -75,7 +75,7 @@ pub struct Step {
 
 /// One step from the fitted hypothesis: what it promises ranks the candidates.
 const QUICK: Effort = Effort { steps: 1, thinned: 1_000, polish: false };
-const CAREFUL: Effort = Effort { steps: 4, thinned: 6_000, polish: false };
+const CAREFUL: Effort = Effort { steps: 6, thinned: 6_000, polish: false };
 
 /// Adds effects to a fitted hypothesis until the residual asks for no more.
 ///
@@ -290,6 +290,10 @@ fn candidates(bench: &Bench, hypothesis: &Hypothesis, residual: &Evaluation, den
     for &id in EffectId::ALL {
         let d = id.description();
         if d.declared || (sensor && !d.in_sensors) || (d.stage == Stage::Actuation && !commands) {
+            continue;
+        }
+        if d.scaling.rate > 0 && !bench.rate_varies() {
+            // a constant per rate hides in the bias of each run
             continue;
         }
         let searched = d.parameters.iter().enumerate().find_map(|(p, parameter)| match parameter.role {

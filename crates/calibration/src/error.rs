@@ -38,7 +38,11 @@ impl Refusal {
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}; wanted: {}", self.place, self.problem, self.wanted)
+        match (self.place.is_empty(), self.wanted.is_empty()) {
+            (true, true) => f.write_str(&self.problem),
+            (true, false) => write!(f, "{}; wanted: {}", self.problem, self.wanted),
+            _ => write!(f, "{}: {}; wanted: {}", self.place, self.problem, self.wanted),
+        }
     }
 }
 

@@ -240,14 +240,20 @@ impl Hypothesis {
         use quantity::{GROWTH, LN_AMPLITUDE, THETA, THETA_RATE};
         out.slopes.clear();
         out.slopes.resize(unknowns.all.len(), [0.0; 4]);
+        let forced = commands
+            .filter(|_| self.force_scale != 0.0 || !unknowns.forcing.columns.is_empty())
+            .map(|v| self.forcing(&v, direction(&seen), at.precession_rad_s, &unknowns.forcing));
+        let mechanical = self.instrument == Instrument::Gyroscope;
         let mut z = if unknowns.readout.is_empty() { self.unread(seen, at) } else { Envelope::zero() };
         for lanes in &unknowns.readout {
             let jets = self.unread_jets(seen, at, lanes);
             let theta = self.bearing(&jets);
             let energy = jets.pendulum().e;
+            let theta_rate = mechanical.then(|| jets.precession(&self.rate_of(&jets, forced.as_ref())));
             for (lane, &i) in lanes.columns.iter().enumerate() {
                 out.slopes[i][THETA] = theta.slope[lane];
                 out.slopes[i][LN_AMPLITUDE] = 0.5 * energy.slope[lane] / energy.value;
+                out.slopes[i][THETA_RATE] = theta_rate.map_or(0.0, |r| r.slope[lane]);
             }
             z = Envelope::new(jets.x_c.value, jets.x_s.value, jets.y_c.value, jets.y_s.value);
         }
@@ -256,7 +262,7 @@ impl Hypothesis {
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
         (out.theta_rate, out.growth) = (0.0, 0.0);
-        if self.instrument == Instrument::Sensor {
+        if !mechanical {
             return;
         }
         for m in self.members.iter().filter(|m| m.id.description().stage == Stage::Mechanics) {
@@ -278,8 +284,7 @@ impl Hypothesis {
         }
         out.growth -= self.damping_per_s;
         let lanes = &unknowns.forcing;
-        if let Some(v) = commands.filter(|_| self.force_scale != 0.0 || !lanes.columns.is_empty()) {
-            let rate = self.forcing(&v, direction(&seen), at.precession_rad_s, lanes);
+        if let Some(rate) = forced {
             let part = |lane: Option<usize>| {
                 let of = |j: Jet| lane.map_or(j.value, |l| j.slope[l]);
                 Envelope::new(of(rate.x_c), of(rate.x_s), of(rate.y_c), of(rate.y_s))
@@ -293,6 +298,17 @@ impl Hypothesis {
                 out.slopes[i][GROWTH] += grow;
             }
         }
+    }
+
+    /// How the mechanics and forces that do not depend on the readout move a vibration, per second.
+    fn rate_of(&self, z: &Envelope<Jet>, forced: Option<&Envelope<Jet>>) -> Envelope<Jet> {
+        let still = |j: Jet| Jet::constant(j.value);
+        let start = forced
+            .map_or_else(Envelope::zero, |f| Envelope::new(still(f.x_c), still(f.x_s), still(f.y_c), still(f.y_s)));
+        self.members
+            .iter()
+            .filter(|m| m.id.description().stage == Stage::Mechanics)
+            .fold(start, |sum, m| sum + m.id.mechanics(&m.values.map(Jet::constant), z))
     }
 
     /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes against

@@ -297,6 +297,7 @@ impl Knowledge<'_> {
 
     fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
         if self.bench.instrument == Instrument::Sensor {
+            warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
             return None;
         }
         let unknown = self.first(EffectId::ActuationGainMismatch);

@@ -31,6 +31,8 @@ pub mod belief {
 const SPIKE: f64 = 6.0;
 /// Rates that differ by less than this share count as one.
 pub(crate) const SAME_RATE: f64 = 0.05;
+/// A rate that changes by more than this share within a run varies.
+const VARYING_RATE: f64 = 0.2;
 /// What the energy balance leaves of ln a, and how far it is trusted at best.
 const BALANCE_NOISE: f64 = 1e-3;
 const BALANCE_SHARE: f64 = 0.3;
@@ -178,6 +180,19 @@ impl Bench {
             p.starts = motion.starts;
         }
         Ok(())
+    }
+
+    /// The rate changes within a fitted run, as in a turn there and back.
+    pub(crate) fn rate_varies(&self) -> bool {
+        self.tracks.iter().map(|p| &p.track).any(|t| {
+            t.segments.iter().filter(|s| s.role == Role::Fit).any(|s| {
+                let stride = (s.range.len() / 200).max(1);
+                let mut rates: Vec<f64> = s.range.clone().step_by(stride).map(|i| t.rate(i)).collect();
+                rates.sort_by(f64::total_cmp);
+                let (low, high) = (rates[rates.len() / 10], rates[rates.len() * 9 / 10]);
+                high - low > VARYING_RATE * low.abs().max(high.abs())
+            })
+        })
     }
 
     /// The runs were left by another fit than this.

@@ -23,11 +23,8 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `cvg identify`
+/// `cvg identify`: files where a folder is given, a summary or the report on standard output.
 pub(crate) fn identify(campaign: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
-    if out.is_none() && !json {
-        return Err(Failure::input("identify needs --out DIR for its files, or --json to print the report"));
-    }
     let identified = run(campaign)?;
     if let Some(out) = out {
         write_results(&identified, out)?;

@@ -29,7 +29,7 @@ Examples:
   cvg identify campaign.toml --out results          the main job: report.html, report.json, calibration.toml
   cvg identify rot+500.csv --out results            one recording is a campaign of one run
   cvg compensate results/calibration.toml rot.csv --out rot-compensated.csv
-  cvg simulate scenario.toml --out bench            a campaign with its truth
+  cvg simulate scenario.toml --out bench            a campaign, and what it was set to
 
 Exit status: 0 done, 1 the data does not allow an answer, 2 bad use or bad input.";
 
@@ -44,7 +44,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Simulate a scenario: a campaign of recordings, with its truth
+    /// Simulate a scenario: a campaign of recordings, and what it was set to
     Simulate {
         /// Scenario file (TOML)
         scenario: PathBuf,
@@ -56,7 +56,7 @@ enum Command {
     Identify {
         /// campaign.toml, or a single recording (CSV or Parquet)
         campaign: PathBuf,
-        /// Folder for report.json, report.html and calibration.toml
+        /// Folder for report.json, report.html and calibration.toml; without it only the summary is printed
         #[arg(long)]
         out: Option<PathBuf>,
         /// Print report.json and nothing else to standard output

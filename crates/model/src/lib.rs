@@ -5,7 +5,7 @@
 //! mechanics at three levels of detail ([`resonator`]), and every effect a recording can hold ([`effects`]).
 //!
 //! Each equation is one function, generic over [`Real`]: the same source runs on `f32` in firmware, on `f64` in the
-//! simulator and the identification, on dual numbers for derivatives, and on the prover's exact and interval scalars.
+//! simulator and the identification, and on dual numbers for derivatives.
 //!
 //! The crate refuses to know about time steps, filters, loops, files or noise: those live in the crates that depend
 //! on it.
