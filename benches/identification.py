@@ -1,21 +1,27 @@
 #!/usr/bin/env python3
-"""Time to identify the paper's device, with scipy and with `cvg identify`.
+"""Time to identify the paper's device: scipy beside cvg.
 
     pip install numpy scipy
-    python benches/identification.py [--rounds 3]
+    python benches/identification.py [--rounds 5] [--no-library]
 
-Simulates the paper's campaign (crates/simulator/scenarios/paper.toml) and the same device without the cubic readout into
+Simulates the paper's campaign (crates/simulator/scenarios/paper.toml), and the same device without the cubic readout, into
 the system's temporary folder, and fits both with numpy and `scipy.optimize.least_squares`. The residual is cvg's: detection
 gains and cubic readout undone sample by sample; the pattern angle less -k times the input angle and less the integral of
 what anisodamping, anisoelasticity and the recorded commands let it precess, Equation 9 at the measured angle included; one
-bias per run. Ten unknowns, all at once, neutral values to begin with but for k = 0.8 and a force scale of 0.05.
+bias per run. Ten unknowns, all at once, from neutral values and k = 0.8, with scipy's own differences for the Jacobian.
 
 What helps scipy is given to it: all runs in one array, so that each operation of numpy is long; biases eliminated, so that
-no column of the Jacobian is spent on them; the trapezium where cvg integrates to fourth order; no robust weights, no priors,
-no spikes, no ring-downs; and the faster of its methods "trf" and "lm". Reading is not in its time, nor starting Python. Of
-cvg everything is: process, reading, ring-downs, three rounds of fits, discovery, held-out errors, report.
+no column of the Jacobian is spent on them; the trapezium where cvg integrates to fourth order; the cubic effect named
+beforehand; no robust weights, no priors, no spikes, no ring-downs. Reading is not in its time, nor starting Python. Both
+its default method "trf" and MINPACK's "lm" are timed.
 
-The two must agree on the detection gain ratio within 5e-5, or nothing is timed.
+Of cvg, `process` is all of `cvg identify CAMPAIGN --json`: start, reading, ring-downs, three rounds of fits, the search for
+undeclared effects, held-out errors, report. `library` is the declared model alone (three rounds of fits with ring-downs,
+held-out errors, report), from `cargo bench -p cvg-calibration --bench identify`; it names no cubic effect, so it stands
+beside scipy where there is none.
+
+The two must agree on the detection gain ratio within 5e-5, or nothing is timed. Times are medians; both sides are divided
+by the same number of residuals of the fit.
 """
 
 import argparse
@@ -35,9 +41,8 @@ from scipy.optimize import least_squares
 
 ROOT = Path(__file__).resolve().parent.parent
 AGREEMENT = 5e-5
-NAMES = ("k", "g", "kappa", "damping c", "damping s", "split c", "split s", "force scale", "ratio G_Ax/G_Ay", "latency")
-NEUTRAL = np.array([0.8, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 1.0, 0.0])
-TYPICAL = np.array([1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-1, 1e-1, 1e-2, 1e-2, 1e-3])
+# k, g, kappa, anisodamping (c, s), anisoelasticity (c, s), force scale, G_Ax/G_Ay, control latency
+NEUTRAL = np.array([0.8, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 FIXED_POINT_STEPS = 5
 
 
@@ -144,56 +149,81 @@ def residual(p, runs):
 
 
 def fit_with_scipy(runs, method):
-    start = time.perf_counter()
-    result = least_squares(residual, NEUTRAL, args=(runs,), method=method, x_scale=TYPICAL, jac="2-point")
-    return time.perf_counter() - start, result
+    """Wall and processor time in s, and the fit."""
+    start, processor = time.perf_counter(), time.process_time()
+    result = least_squares(residual, NEUTRAL, args=(runs,), method=method, jac="2-point")
+    return (time.perf_counter() - start, time.process_time() - processor), result
 
 
 def run_cvg(cvg, campaign):
+    """Wall and processor time of the process in s, and its report."""
     start = time.perf_counter()
-    said = subprocess.run([cvg, "identify", str(campaign), "--json"], check=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL)
-    return time.perf_counter() - start, json.loads(said.stdout)
+    process = subprocess.Popen([cvg, "identify", str(campaign), "--json"], stdout=subprocess.PIPE,
+                               stderr=subprocess.DEVNULL, text=True)
+    with process.stdout:
+        said = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    if status != 0:
+        sys.exit("cvg identify failed")
+    return (time.perf_counter() - start, usage.ru_utime + usage.ru_stime), json.loads(said)
 
 
-def compare(title, cvg, campaign, rounds, verbose):
+def library():
+    """Seconds of the declared model alone through the library, by criterion (median)."""
+    subprocess.run(["cargo", "bench", "-q", "-p", "cvg-calibration", "--bench", "identify", "--", "declared model"],
+                   cwd=ROOT, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    estimates = next((target / "criterion").glob("identify/*declared*/new/estimates.json"))
+    return json.loads(estimates.read_text(encoding="utf-8"))["median"]["point_estimate"] * 1e-9
+
+
+def compare(title, cvg, campaign, rounds, beside=None):
+    """Prints times of scipy and cvg on one campaign, and their ratios."""
     runs = Runs(campaign)
-    print(f"{title}: {runs.rows} rows, {runs.samples} of them residuals of the fit")
-    times = {"trf": [], "lm": [], "cvg": []}
+    print(f"{title}: {runs.rows} rows, {runs.samples} residuals in the fit")
+    times = {"trf": [], "lm": [], "process": []}
     for turn in range(rounds + 1):
-        fits = {}
+        used, report = run_cvg(cvg, campaign)
+        if turn:  # the first turn warms up, and checks
+            times["process"].append(used)
+        ours = report["detection_gain_ratio"]["value"]
         for method in ("trf", "lm"):
-            seconds, fits[method] = fit_with_scipy(runs, method)
-            if turn:  # the first turn warms up
-                times[method].append(seconds)
-        seconds, report = run_cvg(cvg, campaign)
-        if turn:
-            times["cvg"].append(seconds)
-        else:
-            ours = report["detection_gain_ratio"]["value"]
-            for method, fit in fits.items():
-                rms = np.degrees(np.sqrt(np.mean(fit.fun**2)))
-                print(f"  {method:4} g = {fit.x[1]:.6f}, cvg {ours:.6f}; residual {1e3 * rms:.2f} mdeg rms; "
-                      f"{fit.nfev} evaluations of 11 residuals each" if method == "trf" else
-                      f"  {method:4} g = {fit.x[1]:.6f}, cvg {ours:.6f}; residual {1e3 * rms:.2f} mdeg rms; "
-                      f"{fit.nfev} residuals")
-                if verbose:
-                    print("      ", ", ".join(f"{n} {v:.6g}" for n, v in zip(NAMES, fit.x)))
-            if min(abs(f.x[1] - ours) for f in fits.values()) > AGREEMENT:
+            used, fit = fit_with_scipy(runs, method)
+            if turn:
+                times[method].append(used)
+                continue
+            millidegrees = 1e3 * np.degrees(np.sqrt(np.mean(fit.fun**2)))
+            print(f"  scipy {method:4} g = {fit.x[1]:.6f} (cvg {ours:.6f}), residual {millidegrees:.2f} mdeg rms, "
+                  f"{fit.nfev} steps")
+            if abs(fit.x[1] - ours) > AGREEMENT:
                 sys.exit("scipy and cvg do not agree on the detection gain ratio")
-    median = {name: statistics.median(values) for name, values in times.items()}
-    print({k: round(v,4) for k,v in median.items()})
+    median = {name: [statistics.median(column) for column in zip(*values)] for name, values in times.items()}
+    if beside is not None:
+        median["library"] = [beside, None]
+    for name, (wall, processor) in median.items():
+        who = f"cvg {name}" if name in ("process", "library") else f"scipy {name}"
+        text = f"  {who:12} {1e6 * wall / runs.samples:8.2f} us per residual"
+        text += "" if processor is None else f", processor {1e6 * processor / runs.samples:8.2f}"
+        if name in ("process", "library"):
+            text += "   " + ", ".join(
+                f"{median[m][0] / wall:.2f} times as fast as {m}"
+                + ("" if processor is None else f" ({median[m][1] / processor:.2f} by processor time)")
+                for m in ("trf", "lm"))
+        print(text)
+    print(f"  cvg's whole process: {median['process'][0]:.3f} s, processor {median['process'][1]:.3f} s")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--verbose", action="store_true", help="print every unknown")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--no-library", action="store_true", help="only the process, without the bench of the library")
     options = parser.parse_args()
     cvg = build()
+    beside = None if options.no_library else library()
     for title, cubic in (("the paper's campaign", True), ("without the cubic readout", False)):
         with tempfile.TemporaryDirectory(prefix="cvg-identification-") as folder:
-            compare(title, cvg, simulate(cvg, Path(folder), cubic), options.rounds, options.verbose)
+            campaign = simulate(cvg, Path(folder), cubic)
+            compare(title, cvg, campaign, options.rounds, None if cubic else beside)
 
 
 if __name__ == "__main__":

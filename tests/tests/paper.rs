@@ -40,7 +40,7 @@ fn paper_the_gain_mismatches_are_found() {
         actuation.half_width()
     );
     assert!((detection.value - DETECTION_RATIO).abs() <= 1e-4, "{detection:?}");
-    assert!((actuation.value - ACTUATION_RATIO).abs() <= 3e-4, "{actuation:?}");
+    assert!((actuation.value - ACTUATION_RATIO).abs() <= 1e-4, "{actuation:?}");
 }
 
 #[test]

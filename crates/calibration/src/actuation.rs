@@ -119,7 +119,21 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             "at least 20 of each around energy_off_s",
         );
     }
-    let (rate, rate_error) = decay_rate(&off.0, &off.1);
+    let (rate, rate_error) = loop {
+        let (rate, error, intercept) = decay_rate(&off.0, &off.1);
+        let keep = without_spikes(&off.0, &off.1, |t| intercept - rate * t);
+        let before = off.0.len();
+        retain(&mut off.0, &keep);
+        retain(&mut off.1, &keep);
+        if off.0.len() == before || off.0.len() < FEWEST {
+            break (rate, error);
+        }
+    };
+    let level = crate::statistics::median(&mut on.1.clone());
+    let keep = without_spikes(&on.0, &on.1, |_| level);
+    for column in [&mut on.0, &mut on.1, &mut on.2] {
+        retain(column, &keep);
+    }
     if rate <= 3.0 * rate_error {
         return refuse(
             format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
@@ -142,9 +156,9 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     })
 }
 
-/// Decay rate of an amplitude from its logarithm, 1/s, with its standard error: weighted by the squared amplitude, since
+/// Decay rate of an amplitude from its logarithm, 1/s, its standard error, and the intercept: weighted by the squared amplitude, since
 /// the readout's noise is constant.
-fn decay_rate(t: &[f64], ln_a: &[f64]) -> (f64, f64) {
+fn decay_rate(t: &[f64], ln_a: &[f64]) -> (f64, f64, f64) {
     let weight: Vec<f64> = ln_a.iter().map(|l| (2.0 * (l - ln_a[0])).exp()).collect();
     let sum: f64 = weight.iter().sum();
     let mean = |v: &[f64]| v.iter().zip(&weight).map(|(v, w)| v * w).sum::<f64>() / sum;
@@ -157,7 +171,19 @@ fn decay_rate(t: &[f64], ln_a: &[f64]) -> (f64, f64) {
     let slope = stl / stt;
     let rest: f64 =
         t.iter().zip(ln_a).zip(&weight).map(|((t, l), w)| w * (l - ml - slope * (t - mt)).powi(2)).sum::<f64>();
-    (-slope, (rest / (t.len() as f64 - 2.0) / stt).sqrt())
+    (-slope, (rest / (t.len() as f64 - 2.0) / stt).sqrt(), ml - slope * mt)
+}
+
+/// Samples of ln a that lie within six robust deviations of what is expected, in volts rather than in ln a.
+fn without_spikes(t: &[f64], ln_a: &[f64], expected: impl Fn(f64) -> f64) -> Vec<bool> {
+    let off: Vec<f64> = t.iter().zip(ln_a).map(|(t, l)| l.exp() - expected(*t).exp()).collect();
+    let limit = 6.0 * robust_deviation(off.iter().copied()) + f64::MIN_POSITIVE;
+    off.iter().map(|o| o.abs() <= limit).collect()
+}
+
+fn retain(values: &mut Vec<f64>, keep: &[bool]) {
+    let mut kept = keep.iter();
+    values.retain(|_| kept.next().copied().unwrap_or(true));
 }
 
 /// Standard error of a mean from means of blocks: neighbouring samples of a loop's output are not independent.

@@ -99,9 +99,8 @@ impl Calibration {
         let Some((body, sum)) = text.rsplit_once(&marker) else {
             return refuse("the closing checksum is missing".into(), "an unedited calibration.toml as cvg wrote it");
         };
-        let stated = sum.strip_suffix("\"\n").and_then(|s| u32::from_str_radix(s, 16).ok().filter(|_| s.len() == 8));
         let actual = crc32fast::hash(body.as_bytes());
-        if stated != Some(actual) {
+        if sum != format!("{actual:08x}\"\n") {
             return refuse(
                 format!("the file was changed after it was written (its checksum is {actual:08x})"),
                 "an unedited calibration.toml as cvg wrote it",
@@ -111,7 +110,14 @@ impl Calibration {
         if schema != SCHEMA {
             return refuse(format!("its format is \"{schema}\""), &format!("\"{SCHEMA}\": identify again"));
         }
-        let file: File = toml::from_str(body).map_err(|e| Refusal::new(name, e.to_string(), "a calibration"))?;
+        let file: File = toml::from_str(body).map_err(|e| {
+            let line = e.span().map_or(0, |span| body[..span.start.min(body.len())].matches('\n').count() + 1);
+            Refusal::new(
+                name,
+                format!("line {line}: {}", e.message().replace('\n', " ")),
+                "a calibration as cvg wrote it",
+            )
+        })?;
         let instrument = match file.instrument.as_str() {
             "gyroscope" => Instrument::Gyroscope,
             "sensor" => Instrument::Sensor,

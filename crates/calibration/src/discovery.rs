@@ -25,10 +25,12 @@ pub const LEAST_GAIN: f64 = 12.0;
 pub const LEAST_LEAD: f64 = 8.0;
 /// The share of the held-out mean square that it must remove.
 pub const LEAST_HELDOUT_GAIN: f64 = 0.05;
+/// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
+const NOTHING_LEFT: f64 = 1.2;
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 8;
 /// Candidates that are refitted in full after a quick round.
-const FINALISTS: usize = 5;
+const FINALISTS: usize = 4;
 /// Harmonics of the pattern and of the table that are looked at.
 const PATTERN_HARMONICS: u32 = 24;
 const TABLE_HARMONICS: u32 = 64;
@@ -74,7 +76,7 @@ pub struct Step {
 }
 
 /// One step from the fitted hypothesis: what it promises ranks the candidates.
-const QUICK: Effort = Effort { steps: 1, thinned: 1_000, polish: false };
+const QUICK: Effort = Effort { steps: 1, thinned: 400, polish: false };
 const CAREFUL: Effort = Effort { steps: 6, thinned: 6_000, polish: false };
 
 /// Adds effects to a fitted hypothesis until the residual asks for no more.
@@ -171,6 +173,9 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let base = refit(bench, fitted, &fitted.fit.hypothesis, CAREFUL);
+    if bench.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.0 < 0.0) {
+        return Ok(None);
+    }
     ranked.truncate(FINALISTS);
     let mut trials: Vec<Trial> = ranked
         .into_par_iter()
@@ -235,8 +240,11 @@ fn choose(trials: &[Trial], rates_differ: bool) -> Option<(&Trial, Origin, Vec<E
     // Two causes explain it: claim neither, unless nothing empirical describes it.
     match described.filter(|d| d.gain >= LEAST_GAIN) {
         Some(described) => {
-            let mut causes = rivals;
-            causes.insert(0, library.candidate.id);
+            let causes = trials
+                .iter()
+                .filter(|t| !empirical(t) && t.gain > described.gain.min(library.gain) - LEAST_LEAD)
+                .map(|t| t.candidate.id)
+                .collect();
             Some((described, Origin::Empirical, causes))
         }
         None => Some((library, Origin::Discovered, rivals)),

@@ -201,7 +201,7 @@ impl Bench {
     }
 
     /// By what factor the residuals exceed their white part: the median over fitted tracks.
-    fn excess(&self) -> f64 {
+    pub(crate) fn excess(&self) -> f64 {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
         median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
     }

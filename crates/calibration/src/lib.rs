@@ -5,6 +5,16 @@
 //! by the input rotation and by the commands that were recorded with it. The fit looks for the instrument that leaves
 //! nothing but noise.
 //!
+//! ```no_run
+//! use cvg_calibration::{Options, identify, recording::Campaign};
+//!
+//! fn report(path: &std::path::Path) -> Result<(), cvg_calibration::Refusal> {
+//!     let identified = identify(Campaign::open(path)?, &Options::default())?;
+//!     println!("{:?}", identified.report.heldout);
+//!     Ok(())
+//! }
+//! ```
+//!
 //! [`recording`] reads files, [`identify()`] answers, [`calibration`] keeps the answer, [`compensate()`] puts it to use.
 //! This crate knows nothing of the simulator, and renders nothing.
 #![forbid(unsafe_code)]

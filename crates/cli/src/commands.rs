@@ -8,7 +8,7 @@ use std::time::Duration;
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::{Campaign, Recording};
 use cvg_calibration::{Identification, Options};
-use cvg_simulator::Scenario;
+use cvg_simulator::{Scenario, ScenarioError};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{Failure, html, output};
@@ -17,14 +17,27 @@ use crate::{Failure, html, output};
 pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     let text = std::fs::read_to_string(scenario)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", scenario.display())))?;
-    let parsed = Scenario::parse(&text).map_err(|e| Failure::input(format!("{}: {e}", scenario.display())))?;
+    let parsed = Scenario::parse(&text)
+        .map_err(|e| Failure::input(format!("{}: {}", scenario.display(), scenario_problem(&e, &text))))?;
+    output::check_folder(out)?;
     parsed.simulate().write(out).map_err(Failure::input)?;
     eprintln!("wrote {}", out.join("campaign.toml").display());
     Ok(())
 }
 
+/// What is wrong with a scenario and where, in one line.
+fn scenario_problem(error: &ScenarioError, text: &str) -> String {
+    let ScenarioError::Unreadable(unreadable) = error else { return error.to_string() };
+    let before = unreadable.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    let message = unreadable.message().split_whitespace().collect::<Vec<_>>().join(" ");
+    format!("line {line}, column {column}: {message}")
+}
+
 /// `cvg identify`: files where a folder is given, a summary or the report on standard output.
 pub(crate) fn identify(campaign: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+    out.map_or(Ok(()), output::check_folder)?;
     let identified = run(campaign)?;
     if let Some(out) = out {
         write_results(&identified, out)?;
@@ -63,11 +76,13 @@ pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
     Ok(identified?)
 }
 
-/// Writes report.json, report.html and calibration.toml.
+/// Writes report.json, report.html and calibration.toml: all of them, or none.
 pub(crate) fn write_results(identified: &Identification, out: &Path) -> Result<(), Failure> {
-    output::write(&out.join("report.json"), report_json(identified)?.as_bytes())?;
-    output::write(&out.join("report.html"), html::report(identified)?.as_bytes())?;
-    output::write(&out.join("calibration.toml"), identified.calibration.to_text().as_bytes())
+    output::write_all(&[
+        (out.join("report.json"), report_json(identified)?.as_bytes()),
+        (out.join("report.html"), html::report(identified)?.as_bytes()),
+        (out.join("calibration.toml"), identified.calibration.to_text().as_bytes()),
+    ])
 }
 
 /// report.json

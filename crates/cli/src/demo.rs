@@ -12,6 +12,7 @@ const README_POINTS: usize = 900;
 
 /// Runs the demonstration into `out`.
 pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
+    output::check_folder(out)?;
     let campaign = out.join("campaign");
     eprintln!("simulating the paper's device into {}", campaign.display());
     Scenario::paper().simulate().write(&campaign).map_err(Failure::input)?;

@@ -13,7 +13,8 @@ mod output;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Find, explain and remove the angle errors of whole-angle gyroscopes and sin/cos sensors.
 #[derive(Parser)]
@@ -76,7 +77,16 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if error.use_stderr() => {
+            eprintln!("{}", bad_use(&error));
+            return ExitCode::from(2);
+        }
+        // help and version were asked for
+        Err(error) => error.exit(),
+    };
+    let outcome = match arguments.command {
         Command::Demo { out, json } => demo::demo(&out, json),
         Command::Simulate { scenario, out } => commands::simulate(&scenario, &out),
         Command::Identify { campaign, out, json } => commands::identify(&campaign, out.as_deref(), json),
@@ -89,6 +99,23 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status)
         }
     }
+}
+
+/// What is wrong with the arguments, and what would be right, in two lines.
+fn bad_use(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let mut what = if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        let root = Arguments::command();
+        let commands: Vec<&str> = root.get_subcommands().map(clap::Command::get_name).collect();
+        format!("error: a command is missing: {}", commands.join(", "))
+    } else {
+        text.lines().take_while(|line| !line.trim().is_empty()).map(str::trim).collect::<Vec<_>>().join(" ")
+    };
+    if let Some(similar) = text.lines().find_map(|line| line.trim().strip_prefix("tip: a similar ")) {
+        what = format!("{what}; a similar {similar}");
+    }
+    let usage = text.lines().find_map(|line| line.strip_prefix("Usage: ")).unwrap_or("cvg <COMMAND>");
+    format!("{what}\nusage: {usage} (more with --help)")
 }
 
 /// Why a command did not do its work.

@@ -1,20 +1,56 @@
-//! Files are written whole or not at all: to a neighbour first, then moved into place.
+//! Files are written whole or not at all, and so are files that belong together: to neighbours first, then moved into
+//! place.
 
-use std::path::Path;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use crate::Failure;
 
+/// A folder for results is one, or can become one: asked before the work is done.
+pub(crate) fn check_folder(folder: &Path) -> Result<(), Failure> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(Failure::input(format!("{}: is a file; wanted a folder for the results", folder.display())));
+    }
+    Ok(())
+}
+
 /// Writes `bytes` to `path`, creating its folder; an existing file is replaced only by a complete one.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |e: std::io::Error| Failure::input(format!("{}: cannot be written: {e}", path.display()));
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(failed)?;
+    write_all(&[(path.to_owned(), bytes)])
+}
+
+/// Writes all files, or leaves what was there: none is put into its place before every one is complete.
+pub(crate) fn write_all(files: &[(PathBuf, &[u8])]) -> Result<(), Failure> {
+    if let Some((path, _)) = files.iter().find(|(path, _)| path.is_dir()) {
+        return Err(Failure::input(format!("{}: is a directory; wanted the name of a file", path.display())));
     }
-    if path.is_dir() {
-        return Err(Failure::input(format!("{}: is a directory; wanted a file name", path.display())));
+    let written = files.iter().try_for_each(|(path, bytes)| {
+        let whole = || -> io::Result<()> {
+            if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
+                fs::create_dir_all(folder)?;
+            }
+            fs::write(part(path), bytes)
+        };
+        whole().map_err(|e| failed(path, &e))
+    });
+    if written.is_err() {
+        for (path, _) in files {
+            // one that was not begun is not there to be removed
+            let _ = fs::remove_file(part(path));
+        }
+        return written;
     }
+    files.iter().try_for_each(|(path, _)| fs::rename(part(path), path).map_err(|e| failed(path, &e)))
+}
+
+/// The neighbour that a file is written to before it is complete.
+fn part(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".part");
-    let part = path.with_file_name(name);
-    std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path)).map_err(failed)
+    path.with_file_name(name)
+}
+
+fn failed(path: &Path, error: &io::Error) -> Failure {
+    Failure::input(format!("{}: cannot be written: {error}", path.display()))
 }
