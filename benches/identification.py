@@ -36,6 +36,10 @@ import time
 import tomllib
 from pathlib import Path
 
+# the algebra is small: threads of it only wait for each other
+for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")
+
 import numpy as np
 from scipy.optimize import least_squares
 

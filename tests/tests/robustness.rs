@@ -231,7 +231,7 @@ struct Outcome {
     setup: Setup,
     answer: String,
     named: bool,
-    /// discovered, and not what was drawn
+    /// discovered beyond what was drawn, a second time included
     false_claims: usize,
     over_floor: f64,
     /// parameters of a rightly named effect whose interval holds the truth, and all with an interval
@@ -266,7 +266,8 @@ fn outcome(seed: u64) -> Outcome {
     let discovered = found(&identified, Origin::Discovered);
     let empirical = found(&identified, Origin::Empirical);
     outcome.named = empirical.is_empty() && discovered.iter().copied().eq(drawn);
-    outcome.false_claims = discovered.iter().filter(|id| Some(**id) != drawn).count();
+    let right = usize::from(drawn.is_some_and(|drawn| discovered.contains(&drawn)));
+    outcome.false_claims = discovered.len() - right;
     let labels = discovered.iter().map(|id| (*id).to_owned()).chain(empirical.iter().map(|id| format!("({id})")));
     outcome.answer = labels.collect::<Vec<_>>().join(" + ");
     if outcome.answer.is_empty() {
