@@ -162,27 +162,24 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
     let dense = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None);
     let candidates = candidates(bench, &fitted.fit.hypothesis, &before, &dense);
     let base_quick = mean_square(&refit(bench, fitted, &fitted.fit.hypothesis, QUICK));
-    let mut ranked: Vec<(f64, Candidate)> = candidates
+    let mut ranked: Vec<Trial> = candidates
         .into_par_iter()
-        .filter_map(|c| {
-            let trial = refit(bench, fitted, &extend(&fitted.fit.hypothesis, &c, Origin::Discovered), QUICK);
-            let n = count(&trial);
-            let gain = n * (base_quick / mean_square(&trial)).ln() - price(&c, n);
-            gain.is_finite().then_some((gain, c))
+        .filter_map(|candidate| {
+            let fit = refit(bench, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), QUICK);
+            let n = count(&fit);
+            let gain = n * (base_quick / mean_square(&fit)).ln() - price(&candidate, n);
+            gain.is_finite().then_some(Trial { candidate, fit, gain })
         })
         .collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let base = refit(bench, fitted, &fitted.fit.hypothesis, CAREFUL);
-    if bench.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.0 < 0.0) {
+    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    if bench.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.gain < 0.0) {
         return Ok(None);
     }
+    let base = refit(bench, fitted, &fitted.fit.hypothesis, CAREFUL);
     ranked.truncate(FINALISTS);
     let mut trials: Vec<Trial> = ranked
         .into_par_iter()
-        .map(|(_, candidate)| {
-            let fit = refit(bench, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), CAREFUL);
-            Trial { candidate, fit, gain: 0.0 }
-        })
+        .map(|quick| Trial { fit: refit(bench, fitted, &quick.fit.hypothesis, CAREFUL), ..quick })
         .collect();
     let Some(best) = trials.iter().min_by(|a, b| mean_square(&a.fit).total_cmp(&mean_square(&b.fit))) else {
         return Ok(None);

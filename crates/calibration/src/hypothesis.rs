@@ -4,8 +4,9 @@
 //! input, mechanics and actuation effects say how that vibration must move. This file evaluates both at one sample,
 //! with slopes; [`crate::pass`] strings samples together.
 
+use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Role, Stage, Values};
-use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope, Float, Real};
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope, Real};
 use serde::{Deserialize, Serialize};
 
 use crate::jet::{Jet, LANES};
@@ -212,10 +213,11 @@ impl Hypothesis {
 
     /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
     /// `control_latency_s` ago (outputs are held for a control period), through the members' actuation effects. With slopes against `lanes`.
-    fn forcing(&self, v: &Commands, seen_rad: f64, precession_rad_s: f64, lanes: &Lanes) -> Envelope<Jet> {
+    fn forcing(&self, v: &Commands, seen: &Direction<f64>, precession_rad_s: f64, lanes: &Lanes) -> Envelope<Jet> {
         let scale = lanes.jet(self.force_scale, lanes.force_scale);
         let latency = lanes.jet(self.control_latency_s, lanes.control_latency);
-        let applied = Jet::constant(seen_rad) - latency * Jet::constant(precession_rad_s);
+        let (sin_late, cos_late) = (latency * Jet::constant(precession_rad_s)).sin_cos();
+        let (cos, sin) = (Jet::constant(seen.cos), Jet::constant(seen.sin));
         let held = |now: f64, change: f64| Jet::constant(now) - latency * Jet::constant(change);
         let v =
             ControlOutputs { v_as: held(v.now.v_as, v.change_per_s.v_as), v_qc: held(v.now.v_qc, v.change_per_s.v_qc) };
@@ -224,7 +226,10 @@ impl Hypothesis {
             .iter()
             .enumerate()
             .filter(|(_, m)| m.id.description().stage == Stage::Actuation)
-            .fold(equal.axis_forces(&v, applied), |f: AxisForces<Jet>, (i, m)| m.id.actuate(&lanes.values(i, m), f))
+            .fold(
+                equal.axis_forces_along(&v, cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late),
+                |f: AxisForces<Jet>, (i, m)| m.id.actuate(&lanes.values(i, m), f),
+            )
             .envelope_rate(Jet::one())
     }
 
@@ -242,9 +247,13 @@ impl Hypothesis {
         out.slopes.resize(unknowns.all.len(), [0.0; 4]);
         let forced = commands
             .filter(|_| self.force_scale != 0.0 || !unknowns.forcing.columns.is_empty())
-            .map(|v| self.forcing(&v, direction(&seen), at.precession_rad_s, &unknowns.forcing));
+            .map(|v| self.forcing(&v, &major_axis(&seen, &seen.pendulum()), at.precession_rad_s, &unknowns.forcing));
         let mechanical = self.instrument == Instrument::Gyroscope;
-        let mut z = if unknowns.readout.is_empty() { self.unread(seen, at) } else { Envelope::zero() };
+        let mut z = Envelope::zero();
+        if unknowns.readout.is_empty() {
+            z = self.unread(seen, at);
+            out.theta = self.bearing(&z);
+        }
         for lanes in &unknowns.readout {
             let jets = self.unread_jets(seen, at, lanes);
             let theta = self.bearing(&jets);
@@ -256,9 +265,9 @@ impl Hypothesis {
                 out.slopes[i][THETA_RATE] = theta_rate.map_or(0.0, |r| r.slope[lane]);
             }
             z = Envelope::new(jets.x_c.value, jets.x_s.value, jets.y_c.value, jets.y_s.value);
+            out.theta = theta.value;
         }
         let gradient = Gradient::of(&z);
-        out.theta = self.bearing(&z);
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
         (out.theta_rate, out.growth) = (0.0, 0.0);
@@ -343,9 +352,7 @@ impl Hypothesis {
 /// The direction in which the electronics take the pattern to lie, rad over the full turn: Equation 4 with the sign of
 /// the in-phase vibration, so that forces are applied with the right phase.
 pub(crate) fn direction(e: &Envelope<f64>) -> f64 {
-    let half = e.pendulum().angle();
-    let (sin, cos) = half.sin_cos();
-    if e.x_c * cos + e.y_c * sin < 0.0 { half + f64::PI } else { half }
+    major_axis(e, &e.pendulum()).angle()
 }
 
 fn constant_moment(at: &Moment<f64>) -> Moment<Jet> {

@@ -79,6 +79,12 @@ impl<T: Real> ActuationGains<T> {
     #[inline]
     pub fn axis_forces(&self, v: &ControlOutputs<T>, theta: T) -> AxisForces<T> {
         let (sin, cos) = theta.sin_cos();
+        self.axis_forces_along(v, cos, sin)
+    }
+
+    /// [`ActuationGains::axis_forces`] where the cosine and the sine of θ are known.
+    #[inline]
+    pub fn axis_forces_along(&self, v: &ControlOutputs<T>, cos: T, sin: T) -> AxisForces<T> {
         AxisForces {
             x_c: -self.x * v.v_qc * sin,
             x_s: self.x * v.v_as * cos,

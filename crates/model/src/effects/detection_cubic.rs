@@ -46,21 +46,26 @@ fn cubed<T: Real>(kappa: T, c: T, s: T) -> (T, T) {
     (c * gain, s * gain)
 }
 
-/// The inverse of [`cubed`]: Newton's iteration on u = 1/gain, where ¾κm²u³ + u = 1 for the readout's size m.
+/// The inverse of [`cubed`]: u = 1/gain solves ¾κm²u³ + u = 1 for the readout's size m. Newton's first step from u = 1,
+/// then Halley's iteration.
 ///
 /// The cubic is increasing for κ ≥ 0, and for κ < 0 as long as the readout is below its turning point.
 #[inline]
 fn uncubed<T: Real>(kappa: T, c: T, s: T) -> (T, T) {
     let k = T::ratio(3, 4) * kappa * (c * c + s * s);
-    let mut u = T::one();
-    for _ in 0..NEWTON_STEPS {
-        let slope = T::ratio(3, 1) * k * u * u + T::one();
-        if slope > T::zero() {
-            u = u - (k * u * u * u + u - T::one()) / slope;
+    let three_k = T::ratio(3, 1) * k;
+    let first = T::one() + three_k;
+    let mut u = if first > T::zero() { (first - k) / first } else { T::one() };
+    for _ in 0..HALLEY_STEPS {
+        let slope = three_k * u * u + T::one();
+        let rest = k * u * u * u + u - T::one();
+        let divisor = slope * slope - three_k * u * rest;
+        if slope > T::zero() && divisor > T::zero() {
+            u = u - rest * slope / divisor;
         }
     }
     (c * u, s * u)
 }
 
-/// Newton steps of the inverse; from u = 1 they reach f64 rounding for |¾κm²| ≤ 0.1.
-const NEWTON_STEPS: usize = 5;
+/// Halley steps of the inverse; from Newton's first they reach f64 rounding for |¾κm²| ≤ 0.1.
+const HALLEY_STEPS: usize = 2;
