@@ -14,7 +14,7 @@ use cvg_tests::{for_each_scalar, prop_assert_near};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 16] = [
+const IDS: [&str; 17] = [
     "detection-gain-mismatch",
     "detection-skew",
     "detection-offset",
@@ -31,6 +31,7 @@ const IDS: [&str; 16] = [
     "time-periodic",
     "angle-latency",
     "harmonic-n",
+    "rate-offset",
 ];
 
 fn line(a: f64, theta: f64) -> Envelope<f64> {
@@ -162,10 +163,19 @@ fn the_papers_model_is_the_two_mismatches_and_the_two_anisotropies() {
 }
 
 #[test]
-fn only_the_harmonic_without_a_cause_is_empirical() {
+fn what_has_no_known_cause_is_empirical() {
     let empirical: Vec<_> =
         EffectId::ALL.iter().filter(|e| e.description().empirical).map(|e| e.description().id).collect();
-    assert_eq!(empirical, ["harmonic-n"]);
+    assert_eq!(empirical, ["rate-offset", "harmonic-n"]);
+}
+
+#[test]
+fn a_table_is_explained_in_its_low_whole_orders_only() {
+    let explains = |n: f64| EffectId::TableHarmonic.description().explains(&values(&[n, 1e-3]));
+    assert!((1..=8).all(|n| explains(f64::from(n))));
+    assert!(![9.0, 16.0, 3.57, 0.5].into_iter().any(explains));
+    assert!(!EffectId::HarmonicN.description().explains(&values(&[2.0])));
+    assert!(EffectId::DetectionCubic.description().explains(&values(&[1e-3])));
 }
 
 for_each_scalar! {
@@ -222,6 +232,7 @@ for_each_scalar! {
             for ((v, p), size) in v.iter_mut().zip(effect.description().parameters).zip(sizes) {
                 let value = match p.role {
                     Role::Searched(_) => (p.neutral + (size + 1.0) * 4.0).round().max(p.lower),
+                    Role::Chosen(_) => p.neutral,
                     _ => (p.neutral + 10.0 * p.scale * size).clamp(p.lower, p.upper),
                 };
                 *v = T::from_f64(value);
@@ -486,6 +497,22 @@ proptest! {
         let (angle, amplitude) = readout_error(EffectId::AngleLatency, &values(&[latency]), a, theta, &at);
         prop_assert_near!(angle, k_omega * latency, 1e-14);
         prop_assert_near!(amplitude, 0.0, 1e-14);
+    }
+
+    #[test]
+    fn prop_an_empirical_harmonic_scales_with_the_rate_as_its_kind_says(
+        n in 0..32_i32, c in small(), a in sizes(), theta in -PI..PI, precession in 0.1..10.0_f64, back in proptest::bool::ANY,
+    ) {
+        use cvg_model::effects::harmonic_n::scaling::{CONSTANT, DIRECTION, INVERSE_RATE, RATE};
+        let sign = if back { -1.0 } else { 1.0 };
+        let at = Moment { precession_rad_s: sign * precession, ..Moment::default() };
+        for (kind, size) in
+            [(CONSTANT, 1.0), (DIRECTION, sign), (RATE, sign * precession), (INVERSE_RATE, sign / precession)]
+        {
+            let c = 0.1 * c;
+            let (angle, _) = readout_error(EffectId::HarmonicN, &values(&[f64::from(n), c, 0.0, kind]), a, theta, &at);
+            prop_assert_near!(angle, size * c * (f64::from(n) * theta).cos(), 1e-12);
+        }
     }
 
     #[test]

@@ -5,17 +5,20 @@
 //! error on data that was not fitted. Effects come in one at a time; weak ones are dropped again. Where two causes of
 //! the library explain a residual equally well, neither is claimed: an empirical harmonic stands in for both.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values};
+use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values, harmonic_n};
 use rayon::prelude::*;
 
+use crate::balance::energy_balance;
+use crate::consistency::doubt;
 use crate::error::Refusal;
 use crate::evaluate::{Evaluation, evaluate};
 use crate::fit::{Effort, Fit, Window, fit};
 use crate::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::identify::{Bench, Fitted, SAME_RATE, fit_with_ring_downs};
+use crate::identify::{Bench, Fitted, fit_with_ring_downs};
 use crate::recording::{Instrument, Role};
 use crate::residual::{
-    Follows, WHITENESS_LAGS, autocorrelation, inflation, resolved_harmonics, strongest_frequency, strongest_harmonics,
+    Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
+    strongest_line,
 };
 use crate::start::Ellipse;
 
@@ -25,6 +28,13 @@ pub const LEAST_GAIN: f64 = 12.0;
 pub const LEAST_LEAD: f64 = 8.0;
 /// The share of the held-out mean square that it must remove.
 pub const LEAST_HELDOUT_GAIN: f64 = 0.05;
+/// What it removes from the held-out error must be this large beside the noise floor: smaller ones are often what a
+/// larger effect leaves when its place in the chain of the readout is not quite the library's.
+pub const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
+/// A cause under which the energy balance leaves this many times the mean square is refuted.
+pub const REFUTED: f64 = 1.5;
+/// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
+pub const WITNESSED: f64 = 0.8;
 /// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
 const NOTHING_LEFT: f64 = 1.2;
 /// Most effects that are added.
@@ -35,7 +45,7 @@ const FINALISTS: usize = 4;
 const PATTERN_HARMONICS: u32 = 24;
 const TABLE_HARMONICS: u32 = 64;
 /// Strongest harmonics that become candidates.
-const PROPOSALS: usize = 2;
+const PROPOSALS: usize = 3;
 
 /// A way to extend a hypothesis.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +66,10 @@ struct Trial {
     fit: Fit,
     /// gain in likelihood, price paid
     gain: f64,
+    /// mean square of what the energy balance leaves
+    balance: Option<f64>,
+    /// the energy balance is worse with it than without
+    refuted: bool,
 }
 
 /// One accepted step.
@@ -73,6 +87,10 @@ pub struct Step {
     pub heldout_rms_deg: [f64; 2],
     /// effects of the library that explain the residual as well
     pub confounded_with: Vec<EffectId>,
+    /// rms of what the energy balance leaves of ln a, before and after; where amplitude and commands were recorded
+    pub energy_balance: Option<[f64; 2]>,
+    /// why a cause of the library is not claimed
+    pub doubt: Option<String>,
 }
 
 /// One step from the fitted hypothesis: what it promises ranks the candidates.
@@ -105,7 +123,25 @@ pub(crate) fn discover(
         steps.push(step);
     }
     drop_weak(bench, &mut fitted, &mut steps)?;
+    question(bench, &mut fitted.fit, &mut steps);
     Ok((fitted, steps))
+}
+
+/// Asks every run for what was claimed: a cause that a run contradicts becomes an empirical description.
+fn question(bench: &Bench, fit: &mut Fit, steps: &mut [Step]) {
+    for at in 0..fit.hypothesis.members.len() {
+        let member = fit.hypothesis.members[at];
+        if member.origin != Origin::Discovered {
+            continue;
+        }
+        let earlier = fit.hypothesis.members[..at].iter().filter(|m| m.id == member.id).count();
+        let Some(step) = steps.iter_mut().filter(|s| s.id == member.id).nth(earlier) else { continue };
+        if let Some(doubt) = doubt(bench, fit, at) {
+            fit.hypothesis.members[at].origin = Origin::Empirical;
+            step.origin = Origin::Empirical;
+            step.doubt = Some(doubt);
+        }
+    }
 }
 
 /// Offsets and skew of a sensor come in together, from the ellipse that its readout draws: one without the other leads
@@ -145,6 +181,8 @@ fn centre(bench: &mut Bench, plain: &Fitted, ellipse: &Ellipse) -> Result<(Fitte
                 heldout_rms_deg: [heldout(bench, &without), heldout(bench, &with)]
                     .map(|square| square.sqrt().to_degrees()),
                 confounded_with: Vec::new(),
+                energy_balance: None,
+                doubt: None,
             });
         }
     }
@@ -159,8 +197,11 @@ fn centre(bench: &mut Bench, plain: &Fitted, ellipse: &Ellipse) -> Result<(Fitte
 /// The best extension of a fitted hypothesis that earns its place.
 fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)>, Refusal> {
     let before = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
-    let dense = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None);
-    let candidates = candidates(bench, &fitted.fit.hypothesis, &before, &dense);
+    let dense =
+        bench.tracks.iter().any(|p| p.track.stride > 1).then(|| {
+            evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
+        });
+    let candidates = candidates(bench, &fitted.fit.hypothesis, &before, dense.as_ref().unwrap_or(&before));
     let base_quick = mean_square(&refit(bench, fitted, &fitted.fit.hypothesis, QUICK));
     let mut ranked: Vec<Trial> = candidates
         .into_par_iter()
@@ -168,7 +209,7 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
             let fit = refit(bench, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), QUICK);
             let n = count(&fit);
             let gain = n * (base_quick / mean_square(&fit)).ln() - price(&candidate, n);
-            gain.is_finite().then_some(Trial { candidate, fit, gain })
+            gain.is_finite().then_some(Trial { candidate, fit, gain, balance: None, refuted: false })
         })
         .collect();
     ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -192,14 +233,24 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
         t.gain = n * (mean_square(&base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
     }
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let told = Told {
+        rates: bench.tracks_differ(),
+        speeds: bench.speeds_differ(),
+        mechanics: bench.tracks.iter().all(|t| t.track.has_commands() && t.track.has_quadrature()),
+    };
+    let balance_before = balance(bench, &base);
     let heldout_before = heldout(bench, &fitted.fit);
-    while let Some((chosen, origin, confounded_with)) = choose(&trials, bench.tracks_differ()) {
+    let least_removed = (LEAST_SHARE_OF_FLOOR * floor(bench, &fitted.fit)).powi(2);
+    loop {
+        witness(bench, &mut trials, balance_before, told);
+        let Some((chosen, origin, confounded_with)) = choose(&trials, told) else { return Ok(None) };
         let chosen = chosen.clone();
         let next = fit_with_ring_downs(bench, &extend_from(&chosen, origin))?;
         let heldout_after = heldout(bench, &next.fit);
         trials.retain(|t| t.candidate != chosen.candidate);
-        if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before {
-            // gained on the fitted data only: the next one's turn
+        if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before || heldout_before - heldout_after < least_removed
+        {
+            // gained on the fitted data only, or too little to name: the next one's turn
             continue;
         }
         let step = Step {
@@ -209,28 +260,66 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
             rivals: trials.iter().map(|t| (t.candidate.id, t.gain)).take(3).collect(),
             heldout_rms_deg: [heldout_before, heldout_after].map(|square| square.sqrt().to_degrees()),
             confounded_with,
+            energy_balance: balance_before.zip(chosen.balance).map(|(a, b)| [a.sqrt(), b.sqrt()]),
+            doubt: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
         };
         return Ok(Some((next, step)));
     }
-    Ok(None)
+}
+
+/// Mean square of what the energy balance leaves under a fit.
+fn balance(bench: &Bench, fit: &Fit) -> Option<f64> {
+    energy_balance(&bench.tracks, &fit.hypothesis, &fit.starts).map(|b| b.mean_square)
+}
+
+/// Asks the energy balance about the trials that may be chosen, and at one rate about those they have to be told from.
+fn witness(bench: &Bench, trials: &mut [Trial], before: Option<f64>, tell: Told) {
+    let least = trials.first().map_or(0.0, |t| t.gain - LEAST_LEAD);
+    for t in trials.iter_mut().filter(|t| t.balance.is_none() && (t.gain > least || !tell.rates)) {
+        t.balance = balance(bench, &t.fit);
+        t.refuted = before.zip(t.balance).is_some_and(|(before, after)| after > REFUTED * before);
+    }
+}
+
+/// What the fitted runs can tell apart.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    /// runs at two or more rates, or in both directions
+    rates: bool,
+    /// at two or more speeds
+    speeds: bool,
+    /// the loops' commands and the quadrature they left were recorded, which move the pattern too
+    mechanics: bool,
 }
 
 /// The winner among refitted candidates, and in what capacity it comes in.
-fn choose(trials: &[Trial], rates_differ: bool) -> Option<(&Trial, Origin, Vec<EffectId>)> {
+fn choose(trials: &[Trial], tell: Told) -> Option<(&Trial, Origin, Vec<EffectId>)> {
     let best = trials.first().filter(|t| t.gain >= LEAST_GAIN)?;
-    let empirical = |t: &&Trial| t.candidate.id.description().empirical;
-    let library = trials.iter().find(|t| !empirical(t));
+    let empirical = |t: &&Trial| {
+        let d = t.candidate.id.description();
+        // at one speed a delay is a step between the directions
+        let delayed = d.scaling.rate > 0 && !tell.speeds;
+        // without the loops' record what they do to the pattern looks like mechanics
+        let driven = d.stage == Stage::Mechanics && !tell.mechanics;
+        t.refuted || !d.explains(&t.candidate.values) || delayed || driven
+    };
     let described = trials.iter().find(empirical);
-    let Some(library) = library.filter(|l| l.gain >= best.gain - LEAST_LEAD && l.gain >= LEAST_GAIN) else {
+    let level = |t: &&Trial| !empirical(t) && t.gain >= best.gain - LEAST_LEAD && t.gain >= LEAST_GAIN;
+    // of causes that explain the angle equally well, the one that closes the energy balance
+    let told_from = |t: &Trial, other: &Trial| t.balance.zip(other.balance).is_some_and(|(a, b)| a < WITNESSED * b);
+    let leader = trials.iter().find(level);
+    let Some(library) = leader.map(|l| trials.iter().filter(level).find(|t| told_from(t, l)).unwrap_or(l)) else {
         return Some((best, Origin::Empirical, Vec::new()));
     };
-    let rivals: Vec<EffectId> = trials
+    let rivals: Vec<&Trial> = trials
         .iter()
         .filter(|t| !empirical(t) && t.candidate.id != library.candidate.id && t.gain > library.gain - LEAST_LEAD)
-        .map(|t| t.candidate.id)
+        .filter(|t| !told_from(library, t))
         .collect();
-    // At one rate nothing tells a slow push on the pattern from a fault of the readout.
-    let told = rates_differ || library.candidate.id.description().stage != Stage::Mechanics;
+    // At one rate only the energy balance tells a slow push on the pattern from a fault of the readout.
+    let witnessed = trials.iter().filter(|t| t.candidate != library.candidate).all(|t| told_from(library, t));
+    let told = tell.rates || witnessed || library.candidate.id.description().stage != Stage::Mechanics;
+    let rivals: Vec<EffectId> = rivals.into_iter().map(|t| t.candidate.id).collect();
     if rivals.is_empty() && told {
         return Some((library, Origin::Discovered, rivals));
     }
@@ -279,7 +368,14 @@ fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> R
             Some((gain, i)) if gain < LEAST_GAIN => {
                 let mut reduced = fitted.fit.hypothesis.clone();
                 let member = reduced.members.remove(i);
-                *fitted = fit_with_ring_downs(bench, &reduced)?;
+                let before = heldout(bench, &fitted.fit);
+                let without = fit_with_ring_downs(bench, &reduced)?;
+                if (1.0 - LEAST_HELDOUT_GAIN) * heldout(bench, &without.fit) > before {
+                    // weak by itself, but the data that was not fitted asks for it
+                    *fitted = fit_with_ring_downs(bench, &fitted.fit.hypothesis)?;
+                    return Ok(());
+                }
+                *fitted = without;
                 steps.retain(|s| s.id != member.id);
             }
             _ => return Ok(()),
@@ -305,17 +401,30 @@ fn candidates(bench: &Bench, hypothesis: &Hypothesis, residual: &Evaluation, den
             ParameterRole::Searched(over) => Some((p, over)),
             _ => None,
         });
+        let chosen = d.parameters.iter().position(|p| matches!(p.role, ParameterRole::Chosen(_)));
         let plain = Candidate { id, values: id.neutral(), refine: None, tried: 1.0 };
         if let Some((p, over)) = searched {
-            let taken = |v: f64| {
-                hypothesis.members.iter().any(|m| m.id == id && (m.values[p] - v).abs() < 1e-3 * v.abs().max(1e-3))
+            let taken = |values: &Values<f64>| {
+                let same = |q: usize, m: &Values<f64>| (m[q] - values[q]).abs() < 1e-3 * values[q].abs().max(1e-3);
+                hypothesis
+                    .members
+                    .iter()
+                    .any(|m| m.id == id && same(p, &m.values) && chosen.is_none_or(|c| same(c, &m.values)))
             };
             let (found, tried) = proposals(bench, residual, dense, over);
-            for value in found.into_iter().filter(|v| !taken(*v)).take(PROPOSALS) {
+            let proposed = found.into_iter().map(|(value, choice)| {
                 let mut values = id.neutral();
                 values[p] = value;
-                out.push(Candidate { values, tried, ..plain.clone() });
-            }
+                if let Some(c) = chosen {
+                    values[c] = choice;
+                }
+                values
+            });
+            out.extend(proposed.filter(|v| !taken(v)).take(PROPOSALS).map(|values| Candidate {
+                values,
+                tried,
+                ..plain.clone()
+            }));
             continue;
         }
         match hypothesis.position(id) {
@@ -340,32 +449,72 @@ fn candidates(bench: &Bench, hypothesis: &Hypothesis, residual: &Evaluation, den
     out
 }
 
-/// Values that a searched parameter could take, strongest first, and how many were looked at.
-fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<f64>, f64) {
-    let harmonics = |of, limit| {
-        let most = resolved_harmonics(residual, of, limit);
-        let found = strongest_harmonics(residual, of, most).into_iter().map(|(n, _)| f64::from(n)).collect();
-        (found, f64::from(most.max(1)))
-    };
+/// Values that a searched parameter could take with what goes with each of them, strongest first, and how many were
+/// looked at.
+fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<(f64, f64)>, f64) {
     match over {
-        Search::PatternHarmonic => harmonics(Follows::Pattern, PATTERN_HARMONICS),
-        Search::TableHarmonic => harmonics(Follows::Table, TABLE_HARMONICS),
-        Search::Frequency => {
-            // At one rate a line in time is also one in angle: nothing tells which.
-            if !several_rates(bench) {
-                return (Vec::new(), 1.0);
+        Search::PatternHarmonic => {
+            let most = resolved_harmonics(residual, Follows::Pattern, PATTERN_HARMONICS);
+            let scalings = scalings(bench);
+            let mut found: Vec<(f64, f64, f64)> = Vec::new();
+            for &scaling in &scalings {
+                let size = |precession: f64| harmonic_n::factor(scaling, precession);
+                let lines = strongest_harmonics(residual, Follows::Pattern, most, size);
+                found.extend(lines.into_iter().take(PROPOSALS).map(|(n, power)| (power, f64::from(n), scaling)));
             }
+            found.sort_by(|a, b| b.0.total_cmp(&a.0));
+            // a second harmonic against the rate is anisodamping, which is declared
+            let anisodamping = (2.0, harmonic_n::scaling::INVERSE_RATE);
+            let mut found: Vec<(f64, f64)> =
+                found.into_iter().map(|(_, n, scaling)| (n, scaling)).filter(|f| *f != anisodamping).collect();
+            if bench.rate_varies() && scalings.contains(&harmonic_n::scaling::DIRECTION) {
+                // a step between the directions is not seen in the angle's harmonics
+                found.insert(0, (0.0, harmonic_n::scaling::DIRECTION));
+            }
+            (found, f64::from(most.max(1)) * scalings.len() as f64)
+        }
+        Search::TableOrder { .. } => {
+            let most = resolved_harmonics(residual, Follows::Table, TABLE_HARMONICS);
+            let lines = strongest_harmonics(residual, Follows::Table, most, |_| 1.0);
+            let mut found: Vec<(f64, f64)> = lines.iter().take(2).map(|(n, _)| (f64::from(*n), 0.0)).collect();
+            // At one rate a broken order of the table is a line in time.
+            let strongest = lines.first().map_or(0.0, |l| l.1);
+            let broken = strongest_line(residual, Along::Table).filter(|(order, power)| {
+                bench.speeds_differ()
+                    && *power > 2.0 * strongest
+                    && *order > 0.5
+                    && *order < f64::from(most)
+                    && (order - order.round()).abs() > BROKEN_ORDER
+            });
+            found.splice(0..0, broken.map(|(order, _)| (order, 0.0)));
+            (found, f64::from(most.max(1)))
+        }
+        Search::Frequency => {
             let samples: usize = dense.segments.iter().map(|s| s.samples).max().unwrap_or(1);
-            (strongest_frequency(dense).map(|f| f.0).into_iter().collect(), samples as f64)
+            // At one rate a line in time is also one in angle: nothing tells which.
+            let found = strongest_line(dense, Along::Time)
+                .filter(|(_, power)| bench.speeds_differ() && *power > LINE_OVER_DRIFT * drift_power(dense));
+            (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
         }
     }
 }
 
-/// The fitted runs were made at more than one speed.
-pub(crate) fn several_rates(bench: &Bench) -> bool {
-    let rates: Vec<f64> =
-        bench.tracks.iter().filter(|t| t.track.samples(Role::Fit) > 0).map(|t| t.track.mean_rate().abs()).collect();
-    rates.iter().any(|r| (r - rates[0]).abs() > SAME_RATE * rates[0])
+/// An order of the table this far from a whole one is broken.
+const BROKEN_ORDER: f64 = 0.02;
+/// A line in time takes this many times more out of the residual than a slow drift of every run could.
+const LINE_OVER_DRIFT: f64 = 1.5;
+
+/// How a harmonic may scale, as far as the fitted runs can tell.
+fn scalings(bench: &Bench) -> Vec<f64> {
+    use harmonic_n::scaling::{CONSTANT, DIRECTION, INVERSE_RATE, RATE};
+    let mut all = vec![CONSTANT];
+    if bench.both_directions() {
+        all.push(DIRECTION);
+    }
+    if bench.speeds_differ() {
+        all.extend([RATE, INVERSE_RATE]);
+    }
+    all
 }
 
 /// The largest in-phase readout of any channel, V, spikes aside.
@@ -441,6 +590,11 @@ fn price(candidate: &Candidate, n: f64) -> f64 {
 fn sample_cost(evaluation: &Evaluation) -> f64 {
     let correlation = autocorrelation(evaluation, WHITENESS_LAGS);
     inflation(&correlation, evaluation.errors().count())
+}
+
+/// White part of the held-out error, rad.
+fn floor(bench: &Bench, fit: &Fit) -> f64 {
+    evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
 }
 
 /// Held-out mean square of a fit, rad².

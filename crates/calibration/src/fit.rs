@@ -1,7 +1,7 @@
 //! The joint fit of a hypothesis to all runs: Gauss–Newton on robustly weighted residuals, one bias per segment.
 //!
-//! Residuals are those of [`crate::pass`]; the biases are eliminated in closed form, so that the system to solve has
-//! only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
+//! Residuals are those of [`crate::pass`]; the biases are eliminated in closed form ([`crate::sums`]), so that the system
+//! to solve has only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
 //! much narrower than its prior an unknown became is how much the data told of it.
 
 use nalgebra::{DMatrix, DVector};
@@ -11,6 +11,7 @@ use crate::hypothesis::{Hypothesis, Unknown, Unknowns, direction};
 use crate::pass::{Pace, Start, walk};
 use crate::recording::Role;
 use crate::statistics::circular_mean;
+use crate::sums::Sums;
 use crate::track::{Segment, Track};
 
 /// A Gaussian belief about an unknown before the data.
@@ -44,6 +45,8 @@ pub(crate) struct Prepared {
     /// the part of them that is white
     pub(crate) white: Noise,
     pub(crate) starts: Vec<Start>,
+    /// commands that precess the pattern were not recorded: every segment may drift
+    pub(crate) drifts: bool,
     /// residuals beyond this many rad (angle) or relative (amplitude) are set aside
     pub(crate) limit: Noise,
 }
@@ -69,78 +72,6 @@ pub(crate) struct Fit {
     pub(crate) set_aside: usize,
 }
 
-/// Weighted sums of one segment: Σ w v vᵀ with v = (1, slopes …, residual), for angle and amplitude apart.
-struct Sums {
-    n: usize,
-    angle: Vec<f64>,
-    amplitude: Vec<f64>,
-    counted: [usize; 2],
-    set_aside: usize,
-}
-
-impl Sums {
-    fn new(n: usize) -> Self {
-        let size = (n + 2) * (n + 3) / 2;
-        Self { n, angle: vec![0.0; size], amplitude: vec![0.0; size], counted: [0; 2], set_aside: 0 }
-    }
-
-    fn add(packed: &mut [f64], weight: f64, slopes: &[f64], residual: f64) {
-        // rows of the lower triangle: 1; slopes; residual
-        packed[0] += weight;
-        let mut at = 1;
-        for (i, s) in slopes.iter().enumerate() {
-            let ws = weight * s;
-            packed[at] += ws;
-            for (p, q) in packed[at + 1..=at + 1 + i].iter_mut().zip(slopes) {
-                *p += ws * q;
-            }
-            at += i + 2;
-        }
-        let wr = weight * residual;
-        packed[at] += wr;
-        for (p, q) in packed[at + 1..].iter_mut().zip(slopes) {
-            *p += wr * q;
-        }
-        packed[at + 1 + slopes.len()] += wr * residual;
-    }
-
-    /// Element (i, j), i ≥ j, of the packed lower triangle.
-    fn element(packed: &[f64], i: usize, j: usize) -> f64 {
-        packed[i * (i + 1) / 2 + j]
-    }
-
-    /// Adds this segment's part, its bias eliminated, to the normal matrix, the right side and Σr².
-    fn eliminate(&self, packed: &[f64], normal: &mut DMatrix<f64>, right: &mut DVector<f64>) -> f64 {
-        let n = self.n;
-        let one = packed[0];
-        if one <= 0.0 {
-            return 0.0;
-        }
-        let of = |i: usize, j: usize| Self::element(packed, i.max(j), i.min(j));
-        for i in 0..n {
-            for j in 0..=i {
-                let v = of(i + 1, j + 1) - of(i + 1, 0) * of(j + 1, 0) / one;
-                normal[(i, j)] += v;
-                if i != j {
-                    normal[(j, i)] += v;
-                }
-            }
-            right[i] += of(n + 1, i + 1) - of(n + 1, 0) * of(i + 1, 0) / one;
-        }
-        of(n + 1, n + 1) - of(n + 1, 0) * of(n + 1, 0) / one
-    }
-
-    /// Weighted mean residual after a step of the unknowns.
-    fn start_shift(&self, packed: &[f64], step: &DVector<f64>) -> f64 {
-        if packed[0] <= 0.0 {
-            return 0.0;
-        }
-        let n = self.n;
-        let slopes: f64 = (0..n).map(|i| Self::element(packed, i + 1, 0) * step[i]).sum();
-        (Self::element(packed, n + 1, 0) - slopes) / packed[0]
-    }
-}
-
 /// How a fit is run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
@@ -161,6 +92,8 @@ impl Effort {
 const LARGEST_SET_ASIDE: f64 = 0.2;
 /// Limits of spikes are not widened beyond this factor.
 const WIDEST: f64 = 1e6;
+/// How fast unrecorded commands precess a pattern, rad/s: tan(θ_error)/τ for an angle wrong by 10 mrad and τ = 10 s.
+const DRIFT_RAD_S: f64 = 1e-3;
 /// A step is the last when no unknown moves by more than this share of its standard deviation.
 const CONVERGED: f64 = 0.02;
 
@@ -298,8 +231,10 @@ impl Linearised {
         }
         for ((sums, from), to) in self.sums.iter().zip(&self.starts).zip(&mut result.starts) {
             for ((s, from), to) in sums.iter().zip(from).zip(to) {
-                to.angle = from.angle + s.start_shift(&s.angle, step);
-                to.amplitude = from.amplitude + s.start_shift(&s.amplitude, step);
+                let shift = s.start_shift(&s.angle, step);
+                to.angle = from.angle + shift[0];
+                to.drift = from.drift + shift[1];
+                to.amplitude = from.amplitude + s.start_shift(&s.amplitude, step)[0];
             }
         }
     }
@@ -312,7 +247,7 @@ const LARGEST_TURN: f64 = 0.45;
 fn thinning(track: &Track, hypothesis: &Hypothesis, role: Role, effort: Effort) -> usize {
     let samples = track.samples(role);
     let interval = (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / (track.t_s.len().max(2) - 1) as f64;
-    let turn = (hypothesis.precession(track.mean_rate()) * interval).abs().max(1e-12);
+    let turn = (hypothesis.precession(track.mean_speed()) * interval).abs().max(1e-12);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
     let resolved = (LARGEST_TURN / turn) as usize;
     (samples / effort.thinned).min(resolved).max(track.stride)
@@ -336,15 +271,18 @@ fn collect(
         .iter()
         .zip(starts)
         .map(|(segment, start)| {
-            let mut sums = Sums::new(unknowns.all.len());
+            let drift = if prepared.drifts { DRIFT_RAD_S } else { 0.0 };
+            let mut sums = Sums::new(unknowns.all.len(), *start, drift);
+            let first = track.t_s[segment.range.start];
             if segment.role == role {
                 let pace = Pace { stride, spike: limit.angle };
                 walk(track, segment, hypothesis, unknowns, *start, pace, |row| {
                     if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
-                        Sums::add(&mut sums.angle, weights[0], row.angle_slopes, row.angle);
+                        let time = track.t_s[row.index] - first;
+                        Sums::add(&mut sums.angle, weights[0], time, row.angle_slopes, row.angle);
                         sums.counted[0] += worth;
                         if weights[1] > 0.0 {
-                            Sums::add(&mut sums.amplitude, weights[1], row.amplitude_slopes, row.amplitude);
+                            Sums::add(&mut sums.amplitude, weights[1], time, row.amplitude_slopes, row.amplitude);
                             sums.counted[1] += worth;
                         }
                     } else {
@@ -392,12 +330,15 @@ fn solve(
 
 /// The inverse of a symmetric positive semidefinite matrix; directions without information carry a large variance
 /// instead of an infinite one.
-fn scaled_inverse(normal: &DMatrix<f64>, damping: f64) -> Option<DMatrix<f64>> {
+pub(crate) fn scaled_inverse(normal: &DMatrix<f64>, damping: f64) -> Option<DMatrix<f64>> {
     let n = normal.nrows();
     if n == 0 {
         return Some(DMatrix::zeros(0, 0));
     }
-    let scale = DVector::from_iterator(n, (0..n).map(|i| normal[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()));
+    let scale = DVector::from_iterator(
+        n,
+        (0..n).map(|i| if normal[(i, i)] > 0.0 { normal[(i, i)].sqrt().recip() } else { 1.0 }),
+    );
     let eigen = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]).symmetric_eigen();
     let largest = eigen.eigenvalues.max();
     if !(largest.is_finite() && largest > 0.0) {
@@ -482,6 +423,8 @@ pub(crate) struct Residual {
     pub(crate) table: Vec<f64>,
     /// direction of the vibration over the full turn, rad
     pub(crate) direction: Vec<f64>,
+    /// nominal precession rate, rad/s
+    pub(crate) precession: Vec<f64>,
     /// rad
     pub(crate) angle: Vec<f64>,
     pub(crate) amplitude: Vec<f64>,
@@ -497,6 +440,7 @@ impl Residual {
         self.turned.push(row.turned);
         self.table.push(track.input_rad[row.index]);
         self.direction.push(direction(&row.vibration));
+        self.precession.push(row.precession);
         self.angle.push(row.angle);
         self.amplitude.push(row.amplitude);
     }

@@ -17,7 +17,7 @@ use crate::report::{
     BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA,
 };
 use crate::residual::{Follows, WHITENESS_LAGS, autocorrelation, harmonics, inflation, ljung_box, resolved_harmonics};
-use crate::unexplained::unexplained;
+use crate::unexplained::{described, unexplained};
 
 /// How an identification is run.
 pub struct Options<'a> {
@@ -142,7 +142,8 @@ pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identificat
     for (run, r) in runs.iter_mut().filter(|r| r.kind != "rotation").zip(&fitted.ring_downs) {
         run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
     }
-    let unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
+    let mut unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
+    unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
     let report = Report {
         schema: SCHEMA.into(),
         device: device.clone(),
@@ -174,11 +175,11 @@ pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identificat
 }
 
 /// Covariance of the unknowns: that of white residuals, or the larger of it and the block covariance where they have
-/// memory.
+/// memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
 fn covariance(bench: &Bench, fit: &Fit, white: bool) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
     let scale = ((fit.chi2[0] + fit.chi2[1]) / dof).max(f64::MIN_POSITIVE);
-    let plain = &fit.covariance * scale;
+    let plain = &fit.covariance * scale * undescribed(bench, fit);
     if white {
         return plain;
     }
@@ -188,6 +189,20 @@ fn covariance(bench: &Bench, fit: &Fit, white: bool) -> DMatrix<f64> {
     let raise: Vec<f64> =
         (0..n).map(|i| (blocks[(i, i)] / plain[(i, i)].max(f64::MIN_POSITIVE)).max(1.0).sqrt()).collect();
     DMatrix::from_fn(n, n, |i, j| plain[(i, j)] * raise[i] * raise[j])
+}
+
+/// By what factor the mean square would be larger without empirical corrections, where the model is known to lack what
+/// the loops do; 1 elsewhere.
+fn undescribed(bench: &Bench, fit: &Fit) -> f64 {
+    let mut explained = fit.hypothesis.clone();
+    explained.members.retain(|m| m.origin != Origin::Empirical);
+    if explained == fit.hypothesis || !bench.tracks.iter().any(|t| t.drifts) {
+        return 1.0;
+    }
+    let mean_square = |hypothesis: &Hypothesis| {
+        evaluate(&bench.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
+    };
+    (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
 }
 
 fn run_report(run: &crate::recording::Run) -> RunReport {
@@ -451,8 +466,12 @@ fn evidence(member: &Member, step: Option<&Step>) -> String {
     let rivals =
         step.rivals.iter().map(|(id, gain)| format!("{id} by {:.0}", step.gain - gain)).collect::<Vec<_>>().join(", ");
     let beaten = if rivals.is_empty() { String::new() } else { format!("; beat {rivals}") };
+    let balance = step.energy_balance.map_or_else(String::new, |[before, after]| {
+        format!("; the energy balance leaves {:.1} ppm of the amplitude instead of {:.1}", 1e6 * after, 1e6 * before)
+    });
+    let doubt = step.doubt.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
     format!(
-        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°",
+        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{doubt}",
         d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
     )
 }

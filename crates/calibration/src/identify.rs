@@ -4,6 +4,7 @@ use cvg_model::effects::{EffectId, Stage};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::actuation::{DriveGains, RingDown, ring_down};
+use crate::balance::energy_balance;
 use crate::error::Refusal;
 use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
 use crate::hypothesis::{Hypothesis, Origin, Unknown, Unknowns};
@@ -33,6 +34,9 @@ const SPIKE: f64 = 6.0;
 pub(crate) const SAME_RATE: f64 = 0.05;
 /// A rate that changes by more than this share within a run varies.
 const VARYING_RATE: f64 = 0.2;
+/// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
+const STRETCHES: usize = 50;
+const EDGE: usize = 30;
 /// What the energy balance leaves of ln a, and how far it is trusted at best.
 const BALANCE_NOISE: f64 = 1e-3;
 const BALANCE_SHARE: f64 = 0.3;
@@ -117,7 +121,8 @@ impl Bench {
                 amplitude: if by_amplitude { motion.deviation.max(LEAST_NOISE) } else { f64::INFINITY },
             };
             let white = noise;
-            prepared.push(Prepared { noise, white, limit, starts: motion.starts, track });
+            let drifts = instrument == Instrument::Gyroscope && !track.has_commands();
+            prepared.push(Prepared { noise, white, limit, starts: motion.starts, drifts, track });
         }
         let weight: f64 = gains.iter().map(|g| g.1).sum();
         start.angular_gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight;
@@ -182,17 +187,49 @@ impl Bench {
         Ok(())
     }
 
+    /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.
+    fn stretches(&self) -> Vec<Vec<f64>> {
+        let tracks = self.tracks.iter().map(|p| &p.track);
+        let mut rates: Vec<Vec<f64>> = tracks
+            .flat_map(|t| t.segments.iter().filter(|s| s.role == Role::Fit).map(move |s| (t, &s.range)))
+            .map(|(t, range)| {
+                let step = (range.len() / STRETCHES).max(1);
+                let ends = range.clone().step_by(step).zip(range.clone().skip(step).step_by(step));
+                ends.map(|(i, j)| (t.input_rad[j] - t.input_rad[i]) / (t.t_s[j] - t.t_s[i])).collect()
+            })
+            .collect();
+        let fastest = rates.iter().flatten().fold(0.0, |m: f64, r| m.max(r.abs()));
+        for r in &mut rates {
+            r.retain(|r| r.abs() > SAME_RATE * fastest);
+        }
+        rates
+    }
+
     /// The rate changes within a fitted run, as in a turn there and back.
     pub(crate) fn rate_varies(&self) -> bool {
-        self.tracks.iter().map(|p| &p.track).any(|t| {
-            t.segments.iter().filter(|s| s.role == Role::Fit).any(|s| {
-                let stride = (s.range.len() / 200).max(1);
-                let mut rates: Vec<f64> = s.range.clone().step_by(stride).map(|i| t.rate(i)).collect();
-                rates.sort_by(f64::total_cmp);
-                let (low, high) = (rates[rates.len() / 10], rates[rates.len() * 9 / 10]);
+        self.stretches().into_iter().any(|mut rates| {
+            rates.sort_by(f64::total_cmp);
+            let tenth = rates.len() / 10;
+            !rates.is_empty() && {
+                let (low, high) = (rates[tenth], rates[rates.len() - 1 - tenth]);
                 high - low > VARYING_RATE * low.abs().max(high.abs())
-            })
+            }
         })
+    }
+
+    /// The table turns both ways in what is fitted.
+    pub(crate) fn both_directions(&self) -> bool {
+        let rates = self.stretches();
+        let any = |sign: f64| rates.iter().flatten().any(|r| r * sign > 0.0);
+        any(1.0) && any(-1.0)
+    }
+
+    /// The table turns at two or more speeds in what is fitted.
+    pub(crate) fn speeds_differ(&self) -> bool {
+        let mut speeds: Vec<f64> = self.stretches().into_iter().flatten().map(f64::abs).collect();
+        speeds.sort_by(f64::total_cmp);
+        let edge = speeds.len() / EDGE;
+        !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
     }
 
     /// The runs were left by another fit than this.
@@ -208,8 +245,7 @@ impl Bench {
 
     /// Fitted runs were made at two or more rates, or in both directions.
     pub(crate) fn tracks_differ(&self) -> bool {
-        let mut rates = self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0).map(Track::mean_rate);
-        rates.next().is_some_and(|first| rates.any(|r| (r - first).abs() > SAME_RATE * first.abs()))
+        self.both_directions() || self.speeds_differ()
     }
 
     /// Priors for the unknowns that the data may be silent about.
@@ -247,29 +283,13 @@ impl Bench {
     /// The force scale from the energy balance alone: how the amplitude answers to the energy command. The amplitude's
     /// own noise wanders, so this is a belief for the fit of the angle and not a part of it.
     fn balance_energy(&mut self, hypothesis: &mut Hypothesis) {
-        let usable = |p: &Prepared| p.track.has_commands() && p.track.has_amplitude();
-        if self.instrument == Instrument::Sensor || !self.tracks.iter().all(usable) {
-            return;
-        }
-        let kept: Vec<(Noise, Noise)> = self.tracks.iter().map(|p| (p.noise, p.limit)).collect();
-        for p in &mut self.tracks {
-            p.noise = Noise { angle: f64::INFINITY, amplitude: BALANCE_NOISE };
-            p.limit = Noise { angle: f64::INFINITY, amplitude: f64::INFINITY };
-        }
-        let mut unknowns = vec![Unknown::ForceScale, Unknown::Damping];
-        if let Some(member) = hypothesis.position(EffectId::Anisodamping) {
-            unknowns.extend([Unknown::Effect(member, 0), Unknown::Effect(member, 1)]);
-        }
         self.energy_balance = None;
-        let priors = self.priors(hypothesis, None);
-        let result = fit(&self.tracks, hypothesis, &unknowns, &priors, Role::Fit, Effort::ROUGH);
-        let (scale, deviation) = (result.hypothesis.force_scale, result.covariance[(0, 0)].sqrt());
+        let starts: Vec<_> = self.tracks.iter().map(|p| p.starts.clone()).collect();
+        let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };
+        let (scale, deviation) = (balance.force_scale, balance.deviation(BALANCE_NOISE));
         if scale > 2.0 * deviation {
             self.energy_balance = Some((scale, deviation.max(BALANCE_SHARE * scale)));
             hypothesis.force_scale = scale;
-        }
-        for (p, kept) in self.tracks.iter_mut().zip(kept) {
-            (p.noise, p.limit) = kept;
         }
     }
 

@@ -20,9 +20,11 @@
 #![forbid(unsafe_code)]
 
 pub mod actuation;
+mod balance;
 pub mod bias;
 pub mod calibration;
 mod compensate;
+mod consistency;
 pub mod discovery;
 mod error;
 mod evaluate;
@@ -38,6 +40,7 @@ pub mod report;
 mod residual;
 mod start;
 mod statistics;
+mod sums;
 mod track;
 mod unexplained;
 

@@ -20,6 +20,8 @@ pub(crate) struct Row<'a> {
     pub(crate) index: usize,
     /// input angle since the start of the segment, rad
     pub(crate) turned: f64,
+    /// nominal precession rate, rad/s
+    pub(crate) precession: f64,
     /// the vibration
     pub(crate) vibration: Envelope<f64>,
     /// precession by the mechanics and the commands since the start of the segment, rad
@@ -43,6 +45,8 @@ pub(crate) struct Start {
     pub(crate) angle: f64,
     /// ln of the amplitude
     pub(crate) amplitude: f64,
+    /// drift of the pattern that no record explains, rad/s
+    pub(crate) drift: f64,
 }
 
 /// How a segment is walked.
@@ -102,7 +106,9 @@ pub(crate) fn walk(
         last = Some(i);
         let turned = track.input_rad[i] - zero_input;
         let input = turned + excess.value;
-        let along = start.angle + sense * hypothesis.angular_gain * input;
+        let along = start.angle
+            + start.drift * (track.t_s[i] - track.t_s[segment.range.start])
+            + sense * hypothesis.angular_gain * input;
         let off = wrapped(vibration.theta - along - integrals.sum[0], hypothesis.period_rad);
         if hypothesis.instrument == Instrument::Gyroscope && (off.abs() <= pace.spike || integrals.known == 0) {
             integrals.extend_to(track.t_s[i], &integrands);
@@ -122,6 +128,7 @@ pub(crate) fn walk(
         take(&Row {
             index: i,
             turned,
+            precession: at.precession_rad_s,
             vibration: vibration.envelope,
             drift: integrals.sum[0],
             excess: excess.value,

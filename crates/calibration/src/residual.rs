@@ -1,6 +1,6 @@
 //! What is in a residual: harmonics of the pattern and of the table, lines in time, memory from sample to sample.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -74,14 +74,21 @@ impl Line {
     }
 }
 
-/// Powers of the harmonics 1 to `most` of the pattern or the table, strongest first, as (n, power).
-pub(crate) fn strongest_harmonics(evaluation: &Evaluation, of: Follows, most: u32) -> Vec<(u32, f64)> {
+/// Powers of the harmonics 1 to `most` of the pattern or the table, strongest first, as (n, power), where the harmonic
+/// grows with the precession rate as `scaling` says.
+pub(crate) fn strongest_harmonics(
+    evaluation: &Evaluation,
+    of: Follows,
+    most: u32,
+    scaling: impl Fn(f64) -> f64,
+) -> Vec<(u32, f64)> {
     let mut lines = vec![Line::default(); most as usize];
     for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
         for i in (0..s.angle.len()).filter(|&i| kept[i]) {
             // each harmonic from the one before, by the addition theorem
             let (sin, cos) = s.base(of)[i].sin_cos();
-            let (mut sin_n, mut cos_n) = (sin, cos);
+            let size = scaling(s.precession[i]);
+            let (mut sin_n, mut cos_n) = (size * sin, size * cos);
             for line in &mut lines {
                 line.add(s.angle[i], sin_n, cos_n);
                 (sin_n, cos_n) = (sin_n * cos + cos_n * sin, cos_n * cos - sin_n * sin);
@@ -115,24 +122,56 @@ pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u3
 /// Samples of a segment that refine a frequency.
 const REFINED_SAMPLES: usize = 2_000;
 
-/// The strongest line in time, Hz, and its power; from the periodogram of every segment, refined over all.
-pub(crate) fn strongest_frequency(evaluation: &Evaluation) -> Option<(f64, f64)> {
-    const LARGEST: usize = 1 << 17;
-    let interval = {
-        let mut steps: Vec<f64> =
-            evaluation.segments.iter().flat_map(|s| s.t_s.windows(2).take(2000).map(|w| w[1] - w[0])).collect();
-        median(&mut steps)
-    };
-    let longest = evaluation.segments.iter().map(|s| s.angle.len().min(LARGEST)).max()?;
-    if longest < 32 || interval <= 0.0 {
-        return None;
+/// Along what a line is periodic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Along {
+    /// time; lines in Hz
+    Time,
+    /// the table angle; lines in cycles per turn
+    Table,
+}
+
+impl Along {
+    fn of(self, s: &Residual, i: usize) -> f64 {
+        match self {
+            Self::Time => s.t_s[i],
+            Self::Table => s.table[i] / std::f64::consts::TAU,
+        }
     }
-    let size = (2 * longest).next_power_of_two();
+
+    /// The usual step between two samples of a segment.
+    fn step(self, s: &Residual) -> f64 {
+        let mut steps: Vec<f64> =
+            (1..s.t_s.len().min(2000)).map(|i| (self.of(s, i) - self.of(s, i - 1)).abs()).collect();
+        median(&mut steps)
+    }
+}
+
+/// Steps that differ by less than this share count as one.
+const SAME_STEP: f64 = 0.01;
+
+/// The strongest line and its power: from the periodogram of the segments that are sampled as the longest is, refined
+/// over all.
+pub(crate) fn strongest_line(evaluation: &Evaluation, along: Along) -> Option<(f64, f64)> {
+    const LARGEST: usize = 1 << 17;
+    let steps: Vec<f64> = evaluation.segments.iter().map(|s| along.step(s)).collect();
+    let range = |number: usize| steps[number] * evaluation.segments[number].angle.len() as f64;
+    let longest = (0..steps.len()).max_by(|a, b| range(*a).total_cmp(&range(*b)))?;
+    let interval = steps[longest];
+    let alike = |number: usize| (steps[number] - interval).abs() < SAME_STEP * interval;
+    let samples = (0..steps.len())
+        .filter(|n| alike(*n))
+        .map(|n| evaluation.segments[n].angle.len().min(LARGEST))
+        .max()
+        .filter(|samples| *samples >= 32 && interval > 0.0)?;
+    let size = (2 * samples).next_power_of_two();
     let mut planner = RealFftPlanner::<f64>::new();
     let transform = planner.plan_fft_forward(size);
     let mut power = vec![0.0; size / 2 + 1];
     let mut spectrum = transform.make_output_vec();
-    for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
+    for (_, (s, kept)) in
+        evaluation.segments.iter().zip(&evaluation.kept).enumerate().filter(|(number, _)| alike(*number))
+    {
         let mut buffer = transform.make_input_vec();
         for ((b, a), k) in buffer.iter_mut().zip(&s.angle).zip(kept) {
             *b = if *k { *a } else { 0.0 };
@@ -144,7 +183,7 @@ pub(crate) fn strongest_frequency(evaluation: &Evaluation) -> Option<(f64, f64)>
         }
     }
     let df = 1.0 / (size as f64 * interval);
-    let lowest = (2.0 / (longest as f64 * interval) / df).ceil().max(1.0);
+    let lowest = (2.0 / (samples as f64 * interval) / df).ceil().max(1.0);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive index")]
     let from = lowest as usize;
     let peak = (from..power.len().saturating_sub(1)).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
@@ -154,7 +193,7 @@ pub(crate) fn strongest_frequency(evaluation: &Evaluation) -> Option<(f64, f64)>
         for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
             let stride = (s.angle.len() / REFINED_SAMPLES).max(1);
             for i in (0..s.angle.len()).step_by(stride).filter(|&i| kept[i]) {
-                let (sin, cos) = (std::f64::consts::TAU * f * s.t_s[i]).sin_cos();
+                let (sin, cos) = (std::f64::consts::TAU * f * along.of(s, i)).sin_cos();
                 line.add(s.angle[i] * (stride as f64).sqrt(), sin, cos);
             }
         }
@@ -173,6 +212,23 @@ pub(crate) fn strongest_frequency(evaluation: &Evaluation) -> Option<(f64, f64)>
         width *= 0.4;
     }
     Some(best)
+}
+
+/// What a cubic in time, one per segment, takes out of the sum of squares: a drift that is no line.
+pub(crate) fn drift_power(evaluation: &Evaluation) -> f64 {
+    let of_segment = |s: &Residual, kept: &[bool]| {
+        let (Some(first), Some(last)) = (s.t_s.first(), s.t_s.last()) else { return 0.0 };
+        let (middle, half) = (0.5 * (first + last), (0.5 * (last - first)).max(f64::MIN_POSITIVE));
+        let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+        for i in (0..s.angle.len()).filter(|&i| kept[i]) {
+            let x = (s.t_s[i] - middle) / half;
+            let row = Vector4::new(1.0, x, x * x, x * x * x);
+            normal += row * row.transpose();
+            right += row * s.angle[i];
+        }
+        normal.cholesky().map_or(0.0, |c| right.dot(&c.solve(&right)))
+    };
+    evaluation.segments.iter().zip(&evaluation.kept).map(|(s, kept)| of_segment(s, kept)).sum()
 }
 
 /// Amplitudes of harmonics 1 to `most`, fitted together, with 95 % intervals that allow for `inflation` of the variance

@@ -230,7 +230,7 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
             let after: Vec<f64> = turned.iter().zip(rest).map(|(a, r)| r - sense * (gain - guess) * a).collect();
             let angle = circular_mean(after.iter().copied(), hypothesis.period_rad);
             off.extend(after.iter().map(|r| wrapped(r - angle, hypothesis.period_rad)));
-            Start { angle, amplitude: 0.0 }
+            Start { angle, ..Start::default() }
         })
         .zip(&track.segments)
         .map(|(start, segment)| Start { amplitude: mean_ln_amplitude(track, segment, hypothesis), ..start })

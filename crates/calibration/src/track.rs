@@ -77,7 +77,7 @@ impl Track {
         if track.segments.is_empty() {
             return Err(Refusal::new(&name, "too few samples are left after settling", "a longer run"));
         }
-        let turn = track.mean_rate().abs() * (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / track.t_s.len() as f64;
+        let turn = track.mean_speed() * (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / track.t_s.len() as f64;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
         let resolved = (LARGEST_THINNED_TURN / turn.max(1e-12)) as usize;
         track.stride = (track.t_s.len() / ENOUGH_SAMPLES).min(resolved).max(1);
@@ -166,6 +166,14 @@ impl Track {
     /// Samples of all segments of a role.
     pub(crate) fn samples(&self, role: Role) -> usize {
         self.segments.iter().filter(|s| s.role == role).map(|s| s.range.len()).sum()
+    }
+
+    /// Mean speed of the input, rad/s: its turns there and back both count.
+    pub(crate) fn mean_speed(&self) -> f64 {
+        let n = self.t_s.len();
+        let step = (n / 1000).max(1);
+        let turned: f64 = (step..n).step_by(step).map(|i| (self.input_rad[i] - self.input_rad[i - step]).abs()).sum();
+        turned / (self.t_s[n - 1] - self.t_s[0])
     }
 
     /// Mean input rate over the settled run, rad/s.

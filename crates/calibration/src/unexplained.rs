@@ -1,11 +1,15 @@
 //! What is left and has no explanation: classified, sized, and with a word on what could be done.
 
-use crate::discovery::several_rates;
+use cvg_model::effects::{EffectId, harmonic_n};
+
+use crate::discovery::Step;
 use crate::evaluate::Evaluation;
+use crate::hypothesis::{Hypothesis, Member, Origin};
 use crate::identify::Bench;
 use crate::report::Unexplained;
 use crate::residual::{
-    Follows, WHITENESS_LAGS, autocorrelation, inflation, resolved_harmonics, strongest_frequency, strongest_harmonics,
+    Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
+    strongest_line,
 };
 
 /// A line's power over the mean square of the residual, from which it is no accident among those that were looked at:
@@ -16,8 +20,49 @@ fn accidental(power: f64, mean_square: f64, looked_at: f64, cost: f64) -> bool {
 
 /// Lines smaller than this share of the noise floor are not worth a word.
 const SMALLEST_SHARE: f64 = 0.2;
+/// A slow change of every run is a drift where it is this share of all that exceeds the noise.
+const DRIFTS: f64 = 0.4;
 /// The residual may exceed its white part by this factor before "other" is said.
 const LARGEST_EXCESS: f64 = 1.3;
+
+/// What was corrected and not explained.
+pub(crate) fn described(hypothesis: &Hypothesis, steps: &[Step]) -> Vec<Unexplained> {
+    let mut steps: Vec<&Step> = steps.iter().filter(|s| s.origin == Origin::Empirical).collect();
+    let empirical = hypothesis.members.iter().filter(|m| m.origin == Origin::Empirical);
+    empirical
+        .map(|m| {
+            let step = steps.iter().position(|s| s.id == m.id).map(|at| steps.remove(at));
+            let removed = step.map_or(0.0, |s| {
+                let [before, after] = s.heldout_rms_deg;
+                (before * before - after * after).max(0.0).sqrt()
+            });
+            let (class, n, frequency_hz) = class(m);
+            let suggestion = match step.and_then(|s| s.doubt.as_ref()) {
+                Some(doubt) => format!("corrected as {}, which is not its cause: {doubt}", m.id),
+                None => format!("corrected as {}, without a known cause", m.id),
+            };
+            Unexplained { class: class.into(), n, frequency_hz, rms_deg: removed, suggestion }
+        })
+        .collect()
+}
+
+/// Class, harmonic and frequency of an empirical correction.
+fn class(m: &Member) -> (&'static str, Option<u32>, Option<f64>) {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+    let whole = |v: f64| ((v - v.round()).abs() < 1e-6).then_some(v.round() as u32);
+    let by_rate = |scaling: f64| scaling > harmonic_n::scaling::CONSTANT;
+    match m.id {
+        EffectId::HarmonicN if by_rate(m.values[3]) => ("rate-dependent", whole(m.values[0]), None),
+        EffectId::HarmonicN => ("pattern-harmonic", whole(m.values[0]), None),
+        EffectId::TableHarmonic => ("table-harmonic", whole(m.values[0]), None),
+        EffectId::TimePeriodic => ("time-periodic", None, Some(m.values[0])),
+        EffectId::RateOffset | EffectId::ScaleDrift | EffectId::GainDrift => ("drift", None, None),
+        EffectId::SpringCubic | EffectId::DetectionCubic => ("pattern-harmonic", Some(4), None),
+        EffectId::DetectionSkew => ("pattern-harmonic", Some(2), None),
+        EffectId::DetectionOffset => ("pattern-harmonic", Some(1), None),
+        _ => ("other", None, None),
+    }
+}
 
 /// Lists what the residual still holds.
 pub(crate) fn unexplained(
@@ -40,7 +85,7 @@ pub(crate) fn unexplained(
         (Follows::Table, "table-harmonic", "record the table angle (table_deg), or turn the instrument on the table"),
     ] {
         let most = resolved_harmonics(on_fit, of, 64);
-        for (n, power) in strongest_harmonics(on_fit, of, most).into_iter().take(3) {
+        for (n, power) in strongest_harmonics(on_fit, of, most, |_| 1.0).into_iter().take(3) {
             if remarkable(power, f64::from(most)) {
                 out.push(Unexplained {
                     class: class.into(),
@@ -52,9 +97,9 @@ pub(crate) fn unexplained(
             }
         }
     }
-    let worth_saying = several_rates(bench) || out.is_empty();
+    let worth_saying = bench.speeds_differ() || out.is_empty();
     if let Some((frequency, power)) =
-        strongest_frequency(dense).filter(|(_, power)| worth_saying && remarkable(*power, count))
+        strongest_line(dense, Along::Time).filter(|(_, power)| worth_saying && remarkable(*power, count))
     {
         out.push(Unexplained {
             class: "time-periodic".into(),
@@ -62,6 +107,18 @@ pub(crate) fn unexplained(
             frequency_hz: Some(frequency),
             rms_deg: rms(power).to_degrees(),
             suggestion: "a run at another rate would show whether it keeps its frequency".into(),
+        });
+    }
+    let drift = drift_power(on_fit);
+    let excess = (mean_square - floor * floor).max(0.0) * count;
+    if drift > DRIFTS * excess && rms(drift) > SMALLEST_SHARE * floor && remarkable(drift, 1.0) {
+        out.retain(|u| u.class != "time-periodic");
+        out.push(Unexplained {
+            class: "drift".into(),
+            n: None,
+            frequency_hz: None,
+            rms_deg: rms(drift).to_degrees(),
+            suggestion: "a longer settling time, and the temperature recorded".into(),
         });
     }
     let left = heldout.mean_square().sqrt();

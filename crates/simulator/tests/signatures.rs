@@ -162,6 +162,17 @@ fn table_harmonic_follows_the_table_and_not_the_pattern() {
 }
 
 #[test]
+fn rate_offset_is_a_ramp_that_the_table_does_not_turn() {
+    let ramp = |offset: f64| {
+        let run = rotation(&format!(r#"{{ id = "rate-offset", rate_offset = {offset:?} }}"#), 200.0, 40.0);
+        let table = column(&run, "table_deg").iter().map(|d| ANGULAR_GAIN * d.to_radians());
+        let beside: Vec<f64> = angles(&run, Period::Pattern).iter().zip(table).map(|(theta, t)| theta + t).collect();
+        fit(&beside, &[column(&run, "t_s")], &[], &[]).0[0]
+    };
+    close(ramp(1e-4) - ramp(0.0), -1e-4 * ANGULAR_GAIN);
+}
+
+#[test]
 fn scale_drift_is_quadratic_in_time() {
     let run = rotation(r#"{ id = "scale-drift", scale_drift = 1e-5 }"#, 200.0, 40.0);
     let t = column(&run, "t_s");

@@ -23,6 +23,7 @@ pub mod detection_saturation;
 pub mod detection_skew;
 pub mod gain_drift;
 pub mod harmonic_n;
+pub mod rate_offset;
 pub mod scale_drift;
 pub mod spring_cubic;
 pub mod table_harmonic;
@@ -78,7 +79,7 @@ pub struct Parameter {
 }
 
 /// How a fit treats a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
     /// adjusted together with all others
     Fitted,
@@ -86,6 +87,8 @@ pub enum Role {
     Refined,
     /// chosen by a search and then held
     Searched(Search),
+    /// one of these, each tried as an alternative of its own, and then held
+    Chosen(&'static [f64]),
 }
 
 /// Over what a parameter is searched.
@@ -93,8 +96,11 @@ pub enum Role {
 pub enum Search {
     /// harmonics of the pattern angle
     PatternHarmonic,
-    /// harmonics of the table angle
-    TableHarmonic,
+    /// orders of the table angle, whole or not
+    TableOrder {
+        /// whole orders up to this have a cause; what lies beyond or between is described and not explained
+        explained_to: u32,
+    },
     /// frequencies in time
     Frequency,
 }
@@ -161,6 +167,22 @@ pub struct Description {
     /// where the definition comes from
     pub source: &'static str,
 }
+
+impl Description {
+    /// The effect at `values` has a known cause. What has none is empirical: described, corrected, not explained.
+    pub fn explains(&self, values: &Values<f64>) -> bool {
+        !self.empirical
+            && self.parameters.iter().zip(values).all(|(p, v)| match p.role {
+                Role::Searched(Search::TableOrder { explained_to }) => {
+                    *v <= f64::from(explained_to) && (*v - libm::round(*v)).abs() < WHOLE
+                }
+                _ => true,
+            })
+    }
+}
+
+/// An order this close to a whole number is one.
+const WHOLE: f64 = 1e-6;
 
 /// An effect: its description and its forward definition in the stage where it acts.
 pub trait Effect {
@@ -298,6 +320,7 @@ impl core::fmt::Display for EffectId {
 // vibration itself, then plates, axes, amplifier and converter.
 library! {
     TableHarmonic => table_harmonic::TableHarmonic,
+    RateOffset => rate_offset::RateOffset,
     ScaleDrift => scale_drift::ScaleDrift,
     Anisodamping => anisodamping::Anisodamping,
     Anisoelasticity => anisoelasticity::Anisoelasticity,

@@ -1,4 +1,7 @@
 //! A table whose rate follows its own angle: Ω(t) = Ω0(1 + w cos(nα + phase)), resolved into (w cos phase, w sin phase).
+//!
+//! Unbalance, eccentricity and a tilted axis make the low whole orders. Higher ones (poles, teeth, lines of a scale) and
+//! orders that are not whole (bearings) are described by the same formula, but their cause is not known from it.
 
 use super::{Description, Effect, Moment, Scaling, Search, Shown, Stage, Values, fitted, searched};
 use crate::Real;
@@ -15,7 +18,7 @@ impl Effect for TableHarmonic {
         empirical: false,
         in_sensors: true,
         parameters: &[
-            searched("n", "1", 1.0, 720.0, Search::TableHarmonic),
+            searched("n", "1", 0.1, 720.0, Search::TableOrder { explained_to: 8 }),
             fitted("ripple_cos", "1", 0.5, 1e-3),
             fitted("ripple_sin", "1", 0.5, 1e-3),
         ],

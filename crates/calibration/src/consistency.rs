@@ -1,0 +1,122 @@
+//! Whether every run shows what an effect claims.
+//!
+//! An effect that is really there acts in every run as its definition says. Where a run shows a third of it, or twice as
+//! much, the definition fits only by accident: then it may correct, but it does not explain.
+
+use cvg_model::effects::EffectId;
+
+use crate::evaluate::{Evaluation, evaluate};
+use crate::fit::{Fit, Window};
+use crate::hypothesis::Origin;
+use crate::identify::Bench;
+use crate::recording::Role;
+use crate::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
+
+/// A run may show this much more or less of an effect than it should, beside what its noise allows.
+const TOLERATED_SHARE: f64 = 0.15;
+/// What the noise of a run allows, in standard deviations.
+const TOLERATED_DEVIATIONS: f64 = 5.0;
+/// A harmonic without a cause at least this large beside an effect at the same harmonic makes one cause of both likelier.
+const SHARED_HARMONIC: f64 = 0.1;
+/// What a cause does to the held-out angle, beside the error that is left there.
+const SMALLEST_CLAIM: f64 = 0.3;
+/// An effect is at one harmonic when that carries this share of its power.
+const AT_ONE_HARMONIC: f64 = 0.5;
+
+/// What a member of the hypothesis does to the angle of a run, and how much of it the run shows.
+struct Share {
+    run: String,
+    value: f64,
+    deviation: f64,
+}
+
+/// What an effect does to the angle, in the runs of one role.
+struct Contribution {
+    with: Evaluation,
+    /// the angle without the effect less that with it
+    change: Evaluation,
+}
+
+impl Contribution {
+    fn new(bench: &Bench, fit: &Fit, member: usize, role: Role) -> Self {
+        let with = evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole, None);
+        let mut reduced = fit.hypothesis.clone();
+        reduced.members.remove(member);
+        let mut change = evaluate(&bench.tracks, &reduced, &fit.starts, role, Window::Whole, Some(&with));
+        for (without, with) in change.segments.iter_mut().zip(&with.segments) {
+            for (a, b) in without.angle.iter_mut().zip(&with.angle) {
+                *a -= b;
+            }
+        }
+        Self { with, change }
+    }
+
+    fn shares(&self, bench: &Bench) -> Vec<Share> {
+        let count = self.with.errors().count();
+        let cost = inflation(&autocorrelation(&self.with, WHITENESS_LAGS), count);
+        self.with
+            .segments
+            .iter()
+            .zip(&self.change.segments)
+            .zip(&self.with.kept)
+            .map(|((with, change), kept)| {
+                let (mut power, mut left, mut squares, mut n) = (0.0, 0.0, 0.0, 0.0);
+                for ((r, c), _) in with.angle.iter().zip(&change.angle).zip(kept).filter(|(_, k)| **k) {
+                    power += c * c;
+                    left += r * c;
+                    squares += r * r;
+                    n += 1.0;
+                }
+                Share {
+                    run: bench.tracks[with.track].track.name.clone(),
+                    value: if power > 0.0 { 1.0 + left / power } else { 1.0 },
+                    deviation: if power > 0.0 { (squares / n * cost / power).sqrt() } else { f64::INFINITY },
+                }
+            })
+            .collect()
+    }
+
+    /// The harmonic of the pattern that carries most of the change, if one does.
+    fn harmonic(&self) -> Option<u32> {
+        let all: f64 = self.change.errors().map(|c| c * c).sum();
+        [|_: f64| 1.0, |rate: f64| if rate == 0.0 { 0.0 } else { 1.0 / rate }]
+            .into_iter()
+            .filter_map(|scaling| strongest_harmonics(&self.change, Follows::Pattern, 12, scaling).into_iter().next())
+            .find(|(_, power)| *power > AT_ONE_HARMONIC * all)
+            .map(|(n, _)| n)
+    }
+
+    fn rms(&self) -> f64 {
+        self.change.mean_square().sqrt()
+    }
+}
+
+/// Why member `member` cannot be claimed as a cause, if the runs contradict it.
+pub(crate) fn doubt(bench: &Bench, fit: &Fit, member: usize) -> Option<String> {
+    for role in [Role::Fit, Role::Holdout] {
+        let contribution = Contribution::new(bench, fit, member, role);
+        if role == Role::Holdout && contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {
+            return Some("it does too little on held-out data to be recognised".into());
+        }
+        let contradicting = contribution
+            .shares(bench)
+            .into_iter()
+            .find(|s| (s.value - 1.0).abs() > TOLERATED_SHARE + TOLERATED_DEVIATIONS * s.deviation);
+        if let Some(s) = contradicting {
+            return Some(format!("{} shows {:.2} ± {:.2} of it", s.run, s.value, s.deviation));
+        }
+        let harmonic = contribution.harmonic().filter(|_| role == Role::Fit);
+        let beside = fit.hypothesis.members.iter().enumerate().find(|(_, m)| {
+            m.origin == Origin::Empirical
+                && m.id == EffectId::HarmonicN
+                && harmonic.is_some_and(|n| (m.values[0] - f64::from(n)).abs() < 0.5)
+        });
+        if let Some((other, m)) = beside {
+            let size = Contribution::new(bench, fit, other, role).rms();
+            if size > SHARED_HARMONIC * contribution.rms() {
+                return Some(format!("another part of harmonic {} has no known cause", m.values[0]));
+            }
+        }
+    }
+    None
+}

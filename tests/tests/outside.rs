@@ -1,0 +1,246 @@
+//! Errors that are in no file of the library, put into recordings after the simulator made them: they come out as
+//! unexplained or as empirical, never as an effect of the library.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::{Identification, Origin};
+use cvg_model::Envelope;
+use cvg_simulator::scenario::Run;
+use cvg_simulator::{Scenario, Settings, Simulated, SimulatedRun};
+use cvg_tests::bench::{found, identify_folder, over_floor, plain_paper, scenario};
+
+/// Size of the errors, rad: some 20 times the noise.
+const SIZE: f64 = 5e-4;
+/// What may be left on held-out data, × the noise floor, where the error repeats and is corrected.
+const CORRECTED: f64 = 1.3;
+
+/// One sample of a rotation run: what an error may depend on.
+struct Sample {
+    rate_rad_s: f64,
+    t_s: f64,
+    /// table angle, rad
+    table: f64,
+    /// direction of the vibration as read, rad
+    theta: f64,
+}
+
+fn write_and_identify(simulated: &Simulated) -> Identification {
+    let folder = tempfile::tempdir().unwrap();
+    simulated.write(folder.path()).unwrap();
+    std::fs::remove_file(folder.path().join("truth.toml")).unwrap();
+    identify_folder(folder.path()).unwrap()
+}
+
+/// The device with `error` (rad) added to its angle in every rotation run.
+fn with_error(settings: Settings, error: impl Fn(&Sample) -> f64) -> Identification {
+    let mut simulated = scenario(settings).simulate();
+    for run in &mut simulated.runs {
+        if matches!(run.run, Run::Rotation { .. }) {
+            turn_readout(run, &error);
+        }
+    }
+    write_and_identify(&simulated)
+}
+
+fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
+    let column = |name| run.column(name).map(<[f64]>::to_vec);
+    let t = column("t_s").unwrap();
+    let [xc, xs, yc, ys] =
+        ["xc_v", "xs_v", "yc_v", "ys_v"].map(|name| column(name).unwrap_or_else(|| vec![0.0; t.len()]));
+    // the recorded table angle, or the recorded rate summed up
+    let table: Vec<f64> = column("table_deg").unwrap_or_else(|| {
+        let rate = column("rate_dps").unwrap();
+        let mut angle = 0.0;
+        let steps = (0..t.len()).map(|i| rate[i] * (t[i] - t[i.saturating_sub(1)]));
+        steps
+            .map(|step| {
+                angle += step;
+                angle
+            })
+            .collect()
+    });
+    let turned: Vec<Envelope<f64>> = (0..t.len())
+        .map(|i| {
+            let e = Envelope::new(xc[i], xs[i], yc[i], ys[i]);
+            let next = (i + 1).clamp(1, t.len() - 1);
+            let rate_rad_s = ((table[next] - table[next - 1]) / (t[next] - t[next - 1])).to_radians();
+            let sample = Sample { rate_rad_s, t_s: t[i], table: table[i].to_radians(), theta: e.y_c.atan2(e.x_c) };
+            let (sin, cos) = error(&sample).sin_cos();
+            e.turned(sin, cos)
+        })
+        .collect();
+    for column in &mut run.columns {
+        for (v, e) in column.values.iter_mut().zip(&turned) {
+            *v = match column.name {
+                "xc_v" => e.x_c,
+                "xs_v" => e.x_s,
+                "yc_v" => e.y_c,
+                "ys_v" => e.y_s,
+                _ => *v,
+            };
+        }
+    }
+}
+
+/// Checks that no cause of the library is claimed and that something of class `class` is said; `n` where it has one.
+fn is_left_unexplained(identified: &Identification, class: &str, n: Option<u32>) {
+    let said: Vec<_> = identified.report.unexplained.iter().map(|u| (u.class.as_str(), u.n)).collect();
+    println!(
+        "empirical {:?}, {:.3} × floor, unexplained {said:?}",
+        found(identified, Origin::Empirical),
+        over_floor(identified)
+    );
+    assert_eq!(found(identified, Origin::Discovered), Vec::<&str>::new(), "{:#?}", identified.steps);
+    assert!(said.contains(&(class, n)), "{class} {n:?} is not among {said:?}");
+}
+
+fn is_corrected(identified: &Identification) {
+    let ratio = over_floor(identified);
+    assert!(ratio <= CORRECTED, "{ratio} times the noise floor is left");
+}
+
+#[test]
+fn a_table_with_sixteen_teeth_is_described_and_not_explained() {
+    let identified = with_error(plain_paper(), |s| SIZE * (16.0 * s.table + 0.7).sin());
+    is_left_unexplained(&identified, "table-harmonic", Some(16));
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_bearing_of_the_table_is_described_and_not_explained() {
+    let identified = with_error(plain_paper(), |s| SIZE * (3.57 * s.table + 0.7).sin());
+    is_left_unexplained(&identified, "table-harmonic", None);
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_phase_that_depends_on_the_direction_is_not_taken_for_a_spring_or_a_cubic_readout() {
+    let identified = with_error(plain_paper(), |s| SIZE * (4.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos());
+    is_left_unexplained(&identified, "rate-dependent", Some(4));
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_phase_that_depends_on_the_direction_is_not_taken_for_a_skew() {
+    let identified = with_error(plain_paper(), |s| SIZE * (2.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos());
+    is_left_unexplained(&identified, "rate-dependent", Some(2));
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_harmonic_that_grows_with_the_rate_is_described_and_not_explained() {
+    let identified = with_error(plain_paper(), |s| SIZE * (4.0 * s.theta + 0.5).cos() * s.rate_rad_s / 8.7);
+    is_left_unexplained(&identified, "rate-dependent", Some(4));
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_third_harmonic_is_described_and_not_explained() {
+    let identified = with_error(plain_paper(), |s| SIZE * (3.0 * s.theta + 0.5).cos());
+    is_left_unexplained(&identified, "pattern-harmonic", Some(3));
+    is_corrected(&identified);
+}
+
+/// The angle error of a cubic readout without the amplitude that a cubic readout would show.
+#[test]
+fn a_fourth_harmonic_that_the_energy_balance_contradicts_is_not_a_cubic_readout() {
+    let identified = with_error(plain_paper(), |s| -SIZE * (4.0 * s.theta).sin());
+    is_left_unexplained(&identified, "pattern-harmonic", Some(4));
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_settling_angle_is_a_drift() {
+    let identified = with_error(plain_paper(), |s| 4.0 * SIZE * (-s.t_s / 4.0).exp());
+    is_left_unexplained(&identified, "drift", None);
+}
+
+/// A sensor that turns there and back at two speeds; its angle lags by a constant, whichever way it goes.
+const THERE_AND_BACK: &str = r#"
+device = "encoder"
+instrument = "sensor"
+angular_gain = -1.0
+angular_gain_stated = -1.0
+amplitude_v = 1.0
+noise_v = 2e-5
+control_hz = 1000.0
+sample_hz = 100.0
+seed = 3
+effects = [{ id = "detection-gain-mismatch", detection_gain_ratio = 1.02 }]
+
+[[run]]
+kind = "rotation"
+file = "slow.csv"
+rate_dps = 90.0
+duration_s = 24.0
+profile = "there-and-back"
+reference = "table"
+
+[[run]]
+kind = "rotation"
+file = "fast.csv"
+rate_dps = 270.0
+duration_s = 24.0
+profile = "there-and-back"
+reference = "table"
+
+[[run]]
+kind = "rotation"
+file = "check.csv"
+rate_dps = 150.0
+duration_s = 24.0
+profile = "there-and-back"
+reference = "table"
+use = "holdout"
+"#;
+
+#[test]
+fn backlash_is_not_a_latency() {
+    let scenario = Scenario::parse(THERE_AND_BACK).unwrap();
+    let identified = with_error(scenario.settings().clone(), |s| SIZE * s.rate_rad_s.signum());
+    is_left_unexplained(&identified, "rate-dependent", Some(0));
+    is_corrected(&identified);
+}
+
+/// At one speed a latency and a backlash are the same: neither is claimed.
+#[test]
+fn a_latency_at_one_speed_is_not_told_from_backlash() {
+    let mut settings = Scenario::parse(THERE_AND_BACK).unwrap().settings().clone();
+    for run in &mut settings.runs {
+        if let Run::Rotation { rate_dps, .. } = run {
+            *rate_dps = 90.0;
+        }
+    }
+    let identified = with_error(settings, |s| 3e-4 * s.rate_rad_s);
+    assert_eq!(found(&identified, Origin::Discovered), Vec::<&str>::new(), "{:#?}", identified.steps);
+    assert_eq!(found(&identified, Origin::Empirical).len(), 1);
+    is_corrected(&identified);
+}
+
+#[test]
+fn a_latency_at_two_speeds_is_one() {
+    let scenario = Scenario::parse(THERE_AND_BACK).unwrap();
+    let identified = with_error(scenario.settings().clone(), |s| 3e-4 * s.rate_rad_s);
+    assert_eq!(found(&identified, Origin::Discovered), ["angle-latency"], "{:#?}", identified.steps);
+    is_corrected(&identified);
+}
+
+/// Ten times the Earth's rate, which the record of the rate does not hold.
+#[test]
+fn a_rotation_that_was_not_recorded_is_no_fault_of_the_instrument() {
+    const OFFSET_DPS: f64 = 0.04;
+    let mut settings = plain_paper();
+    for run in &mut settings.runs {
+        if let Run::Rotation { rate_dps, .. } = run {
+            *rate_dps += OFFSET_DPS;
+        }
+    }
+    let mut simulated = scenario(settings).simulate();
+    for column in simulated.runs.iter_mut().flat_map(|r| &mut r.columns).filter(|c| c.name == "rate_dps") {
+        for v in column.values.iter_mut().filter(|v| **v != 0.0) {
+            *v -= OFFSET_DPS;
+        }
+    }
+    let identified = write_and_identify(&simulated);
+    assert_eq!(found(&identified, Origin::Discovered), Vec::<&str>::new(), "{:#?}", identified.steps);
+    is_corrected(&identified);
+}
