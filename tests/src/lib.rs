@@ -2,12 +2,15 @@
 //! scalars every equation runs in.
 //!
 //! One file of `tests/` is one equation of the paper, one view of the mechanics, or one promise of the repository. The
-//! prefix of a test says what kind of evidence it is: `prop_` holds over a whole domain, `paper_` reproduces a number
-//! that the paper states, `snapshot_` keeps a table of derived values from changing unseen.
+//! prefix of a test says what kind of evidence it is: `identity_` is proved for all reals, `interval_` is a bound for all
+//! inputs of a box with rounding included, `prop_` was tried at random over a whole domain, `paper_` reproduces a number
+//! that the paper states, `snapshot_` keeps a table of derived values from changing unseen. Each proof `x` has a
+//! `x_twin`: the same claim with an error planted in it, which passes where the engine refutes it.
 #![forbid(unsafe_code)]
 
 pub mod bench;
 pub mod domain;
+pub mod proof;
 pub mod scalar;
 pub mod tolerances;
 

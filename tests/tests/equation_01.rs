@@ -90,7 +90,7 @@ proptest! {
 }
 
 #[test]
-fn a_harmonic_of_the_pattern_survives_the_line() {
+fn prop_a_harmonic_of_the_pattern_survives_the_line() {
     let input: Vec<f64> = (0..10_000).map(|n| f64::from(n) * 20.0 * PI / 10_000.0).collect();
     let angle: Vec<_> = input.iter().map(|&i| pattern_angle(0.78, i, 0.2) + 0.01 * (4.0 * i).cos()).collect();
     let bias = angle_dependent_bias(&input, &angle);
