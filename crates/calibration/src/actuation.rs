@@ -3,6 +3,7 @@
 //! With the pattern held at an angle the energy loop is on, then off. Off, the amplitude decays at the damping of that
 //! direction; on, the command replaces just that loss. The two together give the drive's gain in that direction.
 
+use cvg_model::Real;
 use cvg_model::effects::Moment;
 use nalgebra::{Matrix2, Vector2};
 
@@ -20,7 +21,7 @@ use crate::track::wrapped;
 /// amplitude set point and to a common scale of both gains. Domain: `tau_0`, `v_as_0` ≠ 0. Source: the paper,
 /// Equation 11.
 #[inline]
-pub fn actuation_gain_ratio(tau_0: f64, v_as_0: f64, tau_90: f64, v_as_90: f64) -> f64 {
+pub fn actuation_gain_ratio<T: Real>(tau_0: T, v_as_0: T, tau_90: T, v_as_90: T) -> T {
     (tau_90 * v_as_90) / (tau_0 * v_as_0)
 }
 

@@ -1,5 +1,7 @@
 //! The angle-dependent bias (Equation 1): what is left of the angle when the best line is taken out.
 
+use cvg_model::Real;
+
 use crate::statistics::line;
 
 /// **Equation 1**, the pattern angle of a whole-angle gyroscope, rad:
@@ -8,7 +10,7 @@ use crate::statistics::line;
 ///
 /// `angular_gain` = k_e; `input_rad` = ∫Ω dt, rad; `bias_rad` = θ_b, rad. Source: the paper, Equation 1.
 #[inline]
-pub fn pattern_angle(angular_gain: f64, input_rad: f64, bias_rad: f64) -> f64 {
+pub fn pattern_angle<T: Real>(angular_gain: T, input_rad: T, bias_rad: T) -> T {
     -angular_gain * input_rad + bias_rad
 }
 

@@ -14,7 +14,7 @@ use num_rational::BigRational;
 use num_traits::ToPrimitive;
 
 use crate::fraction::Fraction;
-use crate::world::{self, Kind, World};
+use crate::world::{self, Kind, Orders, World};
 
 /// A real number of the proof that is running on this thread.
 #[derive(Clone, Copy)]
@@ -156,19 +156,47 @@ impl Neg for Exact {
     }
 }
 
-impl PartialEq for Exact {
-    fn eq(&self, other: &Self) -> bool {
-        self.partial_cmp(other) == Some(Ordering::Equal)
+impl Exact {
+    fn decide(self, other: Self, asked: Orders) -> bool {
+        world::with(|w| {
+            let difference = self.value_in(w).minus(&other.value_in(w), w);
+            w.decide(&difference, asked)
+        })
     }
 }
 
+impl PartialEq for Exact {
+    fn eq(&self, other: &Self) -> bool {
+        self.decide(*other, Orders::EQUAL)
+    }
+}
+
+/// Comparisons fork: each answer that is not excluded is a path of its own.
 impl PartialOrd for Exact {
-    /// Forks: each order that is not excluded is a path of its own.
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(world::with(|w| {
-            let difference = self.value_in(w).minus(&other.value_in(w), w);
-            w.compare(&difference)
-        }))
+        Some(if self.decide(*other, Orders::LESS) {
+            Ordering::Less
+        } else if self.decide(*other, Orders::EQUAL) {
+            Ordering::Equal
+        } else {
+            Ordering::Greater
+        })
+    }
+
+    fn lt(&self, other: &Self) -> bool {
+        self.decide(*other, Orders::LESS)
+    }
+
+    fn le(&self, other: &Self) -> bool {
+        self.decide(*other, Orders::NOT_GREATER)
+    }
+
+    fn gt(&self, other: &Self) -> bool {
+        self.decide(*other, Orders::GREATER)
+    }
+
+    fn ge(&self, other: &Self) -> bool {
+        self.decide(*other, Orders::NOT_LESS)
     }
 }
 

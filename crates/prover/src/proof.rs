@@ -9,14 +9,13 @@
 //! hold, and at each such point every claim is evaluated in floating point. A claim that fails there is refuted, which
 //! is more than unproved.
 
-use std::cmp::Ordering;
 use std::fmt;
 
 use num_traits::Signed;
 
 use crate::Exact;
 use crate::fraction::Fraction;
-use crate::world::{self, World};
+use crate::world::{self, Orders, World};
 
 /// Why a proof does not hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,11 +103,9 @@ pub fn prove(argument: impl Fn(&mut Proof) -> Result<(), Refusal>) -> Result<Pro
         proved.paths += 1;
         assert!(proved.paths <= MOST_PATHS, "refused: more than {MOST_PATHS} paths");
         proved.covered += usize::from(proof.close()?);
-        let taken: Vec<Ordering> = world::with(|w| w.taken.iter().map(|choice| choice.order).collect());
+        let taken: Vec<bool> = world::with(|w| w.taken.iter().map(|choice| choice.yes).collect());
         for turn in given..taken.len() {
-            for other in [Ordering::Equal, Ordering::Greater] {
-                scripts.push(taken[..turn].iter().copied().chain([other]).collect());
-            }
+            scripts.push(taken[..turn].iter().copied().chain([!taken[turn]]).collect());
         }
     }
     if proved.covered == 0 { Err(Refusal::Vacuous) } else { Ok(proved) }
@@ -175,6 +172,17 @@ impl Proof {
         let holds = world::with(|w| w.is_positive(&value));
         let left = value.clone();
         self.settle(claim, Claim::Positive(value), holds, &left)
+    }
+
+    /// `value` ≥ 0 by what a comparison on this path found, or by its factors.
+    ///
+    /// # Errors
+    /// Where no comparison says so.
+    pub fn not_negative_by_path(&mut self, claim: &str, value: Exact) -> Result<(), Refusal> {
+        let value = value.fraction();
+        let holds = world::with(|w| w.orders(&value).within(Orders::NOT_LESS));
+        let left = value.clone();
+        self.settle(claim, Claim::NotNegative(value), holds, &left)
     }
 
     /// The product of two values that are known to be positive, which then is known to be positive.
@@ -307,14 +315,7 @@ fn multiplier_times(multiplier: Exact, value: Exact, w: &World) -> Fraction {
 /// All assumptions hold at this point, it lies on this path, and nothing is divided by zero.
 fn admissible(w: &World, at: &[f64]) -> bool {
     let value = |f: &Fraction| f.evaluate(|v| at[v]);
-    let on_path = w.taken.iter().all(|choice| {
-        let difference = value(&choice.difference);
-        match choice.order {
-            Ordering::Greater => difference > 1e-9,
-            Ordering::Less => difference < -1e-9,
-            Ordering::Equal => difference.abs() < 1e-9,
-        }
-    });
+    let on_path = w.taken.iter().all(|choice| choice.orders.hold(value(&choice.difference)));
     on_path
         && w.assumed.iter().all(|f| value(f) > 1e-6)
         && w.divisors.iter().all(|d| d.evaluate(|v| at[v]).abs() > 1e-6)

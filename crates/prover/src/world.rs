@@ -5,7 +5,6 @@
 //! that pay those debts, and the path through comparisons.
 
 use std::cell::RefCell;
-use std::cmp::Ordering;
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
@@ -49,11 +48,57 @@ pub(crate) struct Indeterminate {
     square: Option<Polynomial>,
 }
 
+/// Which of less than, equal to and greater than 0 a value can still be, as bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Orders(u8);
+
+impl Orders {
+    pub(crate) const LESS: Self = Self(1);
+    pub(crate) const EQUAL: Self = Self(2);
+    pub(crate) const GREATER: Self = Self(4);
+    pub(crate) const NOT_LESS: Self = Self(6);
+    pub(crate) const NOT_GREATER: Self = Self(3);
+    const ANY: Self = Self(7);
+    const NONE: Self = Self(0);
+
+    pub(crate) fn within(self, other: Self) -> bool {
+        self.0 & !other.0 == 0
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// What the negative of a value can be.
+    fn mirrored(self) -> Self {
+        Self(self.0 & 2 | (self.0 & 1) << 2 | (self.0 & 4) >> 2)
+    }
+
+    /// Whether a value of this sign is among them.
+    pub(crate) fn hold(self, value: f64) -> bool {
+        const NEAR: f64 = 1e-9;
+        let order = if value > NEAR {
+            Self::GREATER
+        } else if value < -NEAR {
+            Self::LESS
+        } else {
+            Self::EQUAL
+        };
+        order.within(self)
+    }
+}
+
 /// What a comparison found on this path.
 #[derive(Clone, Debug)]
 pub(crate) struct Choice {
     pub(crate) difference: Fraction,
-    pub(crate) order: Ordering,
+    pub(crate) orders: Orders,
+    /// whether the question was answered with yes
+    pub(crate) yes: bool,
 }
 
 #[derive(Default)]
@@ -70,7 +115,7 @@ pub(crate) struct World {
     /// preconditions: assumed to be above 0
     pub(crate) assumed: Vec<Fraction>,
     /// choices to make again, from the first comparison on
-    pub(crate) script: Vec<Ordering>,
+    pub(crate) script: Vec<bool>,
     pub(crate) taken: Vec<Choice>,
 }
 
@@ -90,7 +135,7 @@ pub(crate) fn with<R>(f: impl FnOnce(&mut World) -> R) -> R {
 }
 
 /// Forgets everything and starts a new run along `script`.
-pub(crate) fn begin(script: Vec<Ordering>) {
+pub(crate) fn begin(script: Vec<bool>) {
     with(|world| {
         *world = World { epoch: world.epoch + 1, script, ..World::default() };
         world.declare("π", Kind::Pi, None);
@@ -219,7 +264,8 @@ impl World {
             Kind::Root(radicand) => self.is_positive(&Fraction::whole(radicand.clone())),
             _ => false,
         };
-        let even = |v: Variable, power: u32| power.is_multiple_of(2) && matches!(self.indeterminates[v].kind, Kind::Nonzero);
+        let even =
+            |v: Variable, power: u32| power.is_multiple_of(2) && matches!(self.indeterminates[v].kind, Kind::Nonzero);
         let factors = |m: &Monomial| m.powers().iter().all(|(v, power)| even(*v, *power) || positive(*v));
         let only_positive = |p: &Polynomial| !p.is_zero() && p.terms().all(|(m, c)| c.is_positive() && factors(m));
         by_fact || (only_positive(&value.numerator) && only_positive(&value.denominator))
@@ -233,38 +279,81 @@ impl World {
         };
         let by_factors = value.as_monomial().is_some_and(|(m, _)| m.powers().iter().all(|(v, _)| factor(*v)));
         let by_fact = self.facts.iter().any(|fact| value.multiple_of(&fact.numerator).is_some());
-        let by_path = self
-            .taken
-            .iter()
-            .any(|choice| choice.order != Ordering::Equal && value.multiple_of(&choice.difference.numerator).is_some());
+        let by_path = self.taken.iter().any(|choice| {
+            choice.orders.and(Orders::EQUAL) == Orders::NONE
+                && value.multiple_of(&choice.difference.numerator).is_some()
+        });
         by_factors || by_fact || by_path || self.is_positive(&Fraction::whole(value.clone()))
     }
 
-    /// How `difference` compares with 0: as it must, as it did on this path before, as the script says, or as a new
-    /// choice whose alternatives are to be walked later.
-    pub(crate) fn compare(&mut self, difference: &Fraction) -> Ordering {
-        let known = if let Some(value) = difference.as_constant() {
-            Some(value.cmp(&BigRational::zero()))
-        } else if self.is_positive(difference) {
-            Some(Ordering::Greater)
-        } else if self.is_positive(&difference.negated()) {
-            Some(Ordering::Less)
-        } else {
-            self.taken.iter().find_map(|choice| {
-                let factor = difference.multiple_of(&choice.difference)?;
-                Some(if factor.is_positive() { choice.order } else { choice.order.reverse() })
+    /// How `difference` can compare with 0, by what is known and by the comparisons on this path.
+    pub(crate) fn orders(&self, difference: &Fraction) -> Orders {
+        if let Some(value) = difference.as_constant() {
+            return if value.is_positive() {
+                Orders::GREATER
+            } else if value.is_negative() {
+                Orders::LESS
+            } else {
+                Orders::EQUAL
+            };
+        }
+        let negative = difference.negated();
+        if self.is_positive(difference) {
+            return Orders::GREATER;
+        }
+        if self.is_positive(&negative) {
+            return Orders::LESS;
+        }
+        let by_path = self.taken.iter().fold(Orders::ANY, |orders, choice| {
+            let factor = difference.multiple_of(&choice.difference);
+            factor.map_or(orders, |factor| {
+                orders.and(if factor.is_positive() { choice.orders } else { choice.orders.mirrored() })
             })
+        });
+        let both_ways = [
+            (Orders::GREATER, self.is_absurd(difference, true)),
+            (Orders::LESS, self.is_absurd(&negative, true)),
+            (Orders::EQUAL, self.is_absurd(difference, false) || self.is_absurd(&negative, false)),
+        ];
+        both_ways
+            .into_iter()
+            .fold(by_path, |orders, (order, absurd)| if absurd { orders.without(order) } else { orders })
+    }
+
+    /// Whether `value` above 0 (or, if not `strict`, not below 0) contradicts something on this path: their sum is below 0.
+    fn is_absurd(&self, value: &Fraction, strict: bool) -> bool {
+        let against = |known: &Fraction, known_strict: bool| {
+            let left = value.plus(known, self).negated();
+            self.is_positive(&left) || (left.is_zero() && (strict || known_strict))
         };
-        known.unwrap_or_else(|| {
-            let order = self.script.get(self.taken.len()).copied().unwrap_or(Ordering::Less);
-            self.taken.push(Choice { difference: difference.clone(), order });
-            match order {
-                Ordering::Greater => self.facts.push(difference.clone()),
-                Ordering::Less => self.facts.push(difference.negated()),
-                Ordering::Equal => {}
-            }
-            order
+        self.taken.iter().any(|choice| {
+            let d = &choice.difference;
+            let above = choice.orders.within(Orders::NOT_LESS) && against(d, choice.orders == Orders::GREATER);
+            let below =
+                choice.orders.within(Orders::NOT_GREATER) && against(&d.negated(), choice.orders == Orders::LESS);
+            above || below
         })
+    }
+
+    /// Whether `difference` is one of `asked` in comparison with 0: as is known, as the script says, or as a new choice
+    /// whose alternative is to be walked later.
+    pub(crate) fn decide(&mut self, difference: &Fraction, asked: Orders) -> bool {
+        let possible = self.orders(difference);
+        if possible.within(asked) {
+            return true;
+        }
+        if possible.and(asked) == Orders::NONE {
+            return false;
+        }
+        let yes = self.script.get(self.taken.len()).copied().unwrap_or(true);
+        let orders = if yes { possible.and(asked) } else { possible.without(asked) };
+        self.taken.push(Choice { difference: difference.clone(), orders, yes });
+        if orders == Orders::GREATER {
+            self.facts.push(difference.clone());
+        } else if orders == Orders::LESS {
+            self.facts.push(difference.negated());
+        }
+        yes
     }
 
     /// A value for each indeterminate, the `n`th of many, drawn over its domain.
