@@ -13,9 +13,15 @@
 
 mod exact;
 mod fraction;
+mod interval;
 mod polynomial;
 mod proof;
+mod rounded;
+mod search;
 mod world;
 
 pub use exact::Exact;
+pub use interval::Interval;
 pub use proof::{Proof, Proved, Refusal, Square, prove, refuted};
+pub use rounded::{Format, Rounded};
+pub use search::{Bounded, Failure, Formula, bound_rounding};
