@@ -51,6 +51,23 @@ macro_rules! for_each_scalar {
     };
 }
 
+/// Runs the proofs inside for `T = f64` and for `T = f32`.
+#[macro_export]
+macro_rules! for_each_precision {
+    ($($proofs:tt)*) => {
+        mod in_f64 {
+            use super::*;
+            type T = f64;
+            $($proofs)*
+        }
+        mod in_f32 {
+            use super::*;
+            type T = f32;
+            $($proofs)*
+        }
+    };
+}
+
 /// `actual` is within `tolerance` of `expected` (both as `f64`), or the test fails and shows all three.
 #[macro_export]
 macro_rules! prop_assert_near {

@@ -28,9 +28,12 @@ macro_rules! table {
 }
 
 table! {
-    /// Equation 1
-    BIAS: "Equation 1", 2e-13, 1e-4,
+    /// Equation 1, the angle-dependent bias
+    BIAS: "Equation 1, its line taken out", 2e-13, 1e-4,
         "of the largest angle of the run: a mean over some hundred samples and a line over some hundred radians";
+    /// Equation 1, the angle itself
+    PATTERN_ANGLE: "Equation 1, θ", 4e-16, 2e-7,
+        "of the largest angle of the run: a product and a sum";
     /// Equation 2
     PENDULUM: "Equation 2", 4e-15, 2e-6,
         "of E: three products and two sums, after an orbit's sine, cosine and phase rotation: below 16 ε";
@@ -50,8 +53,8 @@ table! {
     DETECTION_ANGLE: "Equation 7", 3e-15, 1e-6,
         "rad: a sine, a product and an arctangent at angles up to π, and π itself is rounded by up to ε";
     /// Equation 7, closed form of the error
-    DETECTION_ERROR: "Equation 7, θ_error", 1e-15, 5e-7,
-        "rad: g ∓ 1 are rounded once; the denominator never cancels for g > 0, so the error is a few ε of the angle";
+    DETECTION_ERROR: "Equation 7, θ_error", 1.2e-15, 6e-7,
+        "rad: up to g = 5 the roundings of both arguments and an arctangent within 2 units add up to 4.5 ε, as proved";
     /// Equation 8
     MISALIGNED_FORCES: "Equation 8", 1e-15, 5e-7,
         "of G_A (|v_as| + |v_qc|): one sine or cosine and two products";

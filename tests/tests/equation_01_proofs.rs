@@ -1,12 +1,16 @@
-//! Equation 1, proved: for all reals on the shipping source.
+//! Equation 1, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 //!
 //! The least-squares line that [`cvg_calibration::bias::angle_dependent_bias`] takes out runs on `f64` only: what is said
 //! of it is tested, not proved.
 
+use core::f64::consts::PI;
+
 use cvg_calibration::bias::pattern_angle;
 use cvg_model::Real;
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::PATTERN_ANGLE;
 
 /// Any angular gain, input angle and bias.
 fn any() -> [Exact; 3] {
@@ -72,4 +76,39 @@ fn identity_a_constant_shifts_every_angle_alike() {
 #[test]
 fn identity_a_constant_shifts_every_angle_alike_twin() {
     rejects(WRONG, a_constant_shifts_every_angle_alike);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Angular gains up to 2, a thousand radians of input, any bias.
+fn runs() -> Vec<Inputs> {
+    vec![vec![Interval::new(-2.0, 2.0), Interval::new(-1e3, 1e3), Interval::new(-PI, PI)]]
+}
+
+/// The angle, relative to the largest of the run.
+struct PatternAngle;
+
+impl Formula for PatternAngle {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![pattern_angle(x[0], x[1], x[2])]
+    }
+
+    fn scale<T: Real>(&self, _: &[T]) -> T {
+        T::ratio(2000, 1)
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-01.md#the-pattern-turns-against-the-input
+    //= type=test
+    //# The pattern angle MUST be the bias less the effective angular gain times the integral of the input rate.
+    #[test]
+    fn interval_the_pattern_angle() {
+        bounded::<T>(&PatternAngle, &runs(), &PATTERN_ANGLE);
+    }
+
+    #[test]
+    fn interval_the_pattern_angle_twin() {
+        rejects_rounding::<T>(&PatternAngle, &runs(), &PATTERN_ANGLE);
+    }
 }

@@ -138,6 +138,9 @@ fn prop_a_vibration_ahead_of_the_reference_has_negative_l() {
     approx::assert_relative_eq!(p.l, -(2.0 * delta).sin(), max_relative = 1e-14);
 }
 
+//= specs/equation-02.md#axes-and-orientation
+//= type=test
+//# The variables of an orbit MUST be E = a² + q², Q = 2aq, R = (a² − q²) cos 2θ, S = (a² − q²) sin 2θ and L = −(a² − q²) sin 2δ.
 #[test]
 fn snapshot_of_the_variables_around_a_turn() {
     let mut table = String::from("theta_deg      E      Q      R      S      L\n");

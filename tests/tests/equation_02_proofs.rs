@@ -1,8 +1,11 @@
-//! Equation 2, proved: for all reals on the shipping source.
+//! Equation 2, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::{Envelope, Orbit, Pendulum, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{TOO_TIGHT, WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::any_vector;
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::PENDULUM;
 
 /// Any envelope.
 fn any(name: &str) -> Envelope<Exact> {
@@ -235,4 +238,35 @@ fn identity_the_rates_are_the_derivatives() {
 #[test]
 fn identity_the_rates_are_the_derivatives_twin() {
     rejects(WRONG, the_rates_are_the_derivatives);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// The five variables relative to E, and to E again where they bound their own.
+struct PendulumOf;
+
+impl Formula for PendulumOf {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let p = Envelope::new(x[0], x[1], x[2], x[3]).pendulum();
+        vec![p.e, p.q, p.r, p.s, p.l]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        Envelope::new(x[0], x[1], x[2], x[3]).pendulum().e
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-02.md#axes-and-orientation
+    //= type=test
+    //# The variables of an orbit MUST be E = a² + q², Q = 2aq, R = (a² − q²) cos 2θ, S = (a² − q²) sin 2θ and L = −(a² − q²) sin 2δ.
+    #[test]
+    fn interval_the_pendulum_variables() {
+        bounded::<T>(&PendulumOf, &any_vector(4), &PENDULUM);
+    }
+
+    #[test]
+    fn interval_the_pendulum_variables_twin() {
+        rejects_rounding::<T>(&PendulumOf, &any_vector(4), &PENDULUM);
+    }
 }

@@ -204,3 +204,26 @@ fn prop_a_controller_outside_its_domain_is_refused_by_name() {
         }
     }
 }
+
+//= specs/equation-03.md#no-windup
+//= type=test
+//# The integral MUST NOT grow in the direction in which the output is at its limit.
+/// A controller that is asked for more than its limit and then let go: it leaves the limit at once.
+#[test]
+fn snapshot_of_a_step_response_into_the_limit() {
+    let pi = Pi::new(2.0, 0.05, 0.01, 1.0).expect("inside the domain");
+    let mut state = PiState::default();
+    let mut table = String::from("  n   error    v_as  status   integral\n");
+    for n in 0..16_i32 {
+        let error = if (4..10).contains(&n) { 0.8 } else { 0.1 };
+        let error = if n < 12 { error } else { -0.2 };
+        let command: Command<f64> = pi.energy(&mut state, 1.0 + error, 1.0);
+        table += &format!(
+            "{n:3}{error:8.3}{:8.3}  {:8}{:9.4}\n",
+            command.volts,
+            format!("{:?}", command.status),
+            state.integral
+        );
+    }
+    insta::assert_snapshot!(table);
+}

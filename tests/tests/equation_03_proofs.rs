@@ -1,4 +1,4 @@
-//! Equation 3, proved: for all reals on the shipping source.
+//! Equation 3, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 //!
 //! [`Pi`] is walked along every path through its limits. What its floating numbers add (NaN, infinities, rounding) is
 //! the matter of other evidence.
@@ -7,8 +7,11 @@ use cvg_controller::pi::{Pi, PiState, energy_control, quadrature_control};
 use cvg_controller::{Command, Status};
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Envelope, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{TOO_TIGHT, WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::{any_vector, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::CONTROL;
 
 /// Any controller that can be built: gain, integration time, period and limit.
 fn controller() -> (Pi<Exact>, [Exact; 4]) {
@@ -196,4 +199,42 @@ fn identity_the_loops_are_stable() {
 #[test]
 fn identity_the_loops_are_stable_twin() {
     rejects(&[(-1, 1)], the_loops_are_stable);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Gain and integration time at every scale; error and integral such that one is the largest.
+fn controllers() -> Vec<Inputs> {
+    any_vector(2).into_iter().map(|v| [vec![octave(), octave()], v].concat()).collect()
+}
+
+/// Both outputs relative to half of K, which is below K(|e| + |∫e|/τ) there.
+struct Outputs;
+
+impl Formula for Outputs {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![energy_control(x[0], x[1], x[2], x[3]), quadrature_control(x[0], x[1], x[2], x[3])]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        T::half() * x[0]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-03.md#proportional-part
+    //= type=test
+    //# A step of the error MUST change the output at once by the gain times the step.
+    //= specs/equation-03.md#integral-part
+    //= type=test
+    //# A constant error MUST change the output by the gain times the error times the time over twice the integration time.
+    #[test]
+    fn interval_the_outputs() {
+        bounded::<T>(&Outputs, &controllers(), &CONTROL);
+    }
+
+    #[test]
+    fn interval_the_outputs_twin() {
+        rejects_rounding::<T>(&Outputs, &controllers(), &CONTROL);
+    }
 }

@@ -142,3 +142,23 @@ fn prop_quadrature_does_not_tilt_the_angle() {
         approx::assert_relative_eq!(orbit.envelope().pendulum().angle(), 0.4, max_relative = 1e-14);
     }
 }
+
+//= specs/equation-04.md#orientation-of-the-orbit
+//= type=test
+//# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+#[test]
+fn snapshot_of_the_angle_over_orientation_and_quadrature() {
+    let shares = [0.0, 0.3, -0.3, 0.9];
+    let mut table = format!("theta_deg{}\n", shares.map(|q| format!("{:>12}", format!("q/a = {q}"))).concat());
+    for theta_deg in (-180..=180_i32).step_by(30) {
+        let row = shares.map(|q| {
+            let orbit = Orbit { a: 1.0, q, theta: f64::from(theta_deg).to_radians(), delta: 0.2 };
+            let angle = orbit.envelope().pendulum().angle().to_degrees();
+            // the two ends of the range are one state
+            let angle = if angle < -89.999 { angle + 180.0 } else { angle };
+            format!("{angle:12.3}").replace("-0.000", " 0.000")
+        });
+        table += &format!("{theta_deg:9}{}\n", row.concat());
+    }
+    insta::assert_snapshot!(table);
+}

@@ -1,10 +1,13 @@
-//! Equation 4, proved: for all reals on the shipping source.
+//! Equation 4, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 //!
 //! Angles have a period of 180°, so what is compared is twice the angle.
 
 use cvg_model::{Envelope, Orbit, Pendulum, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::any_vector;
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::ANGLE;
 
 /// Any envelope but one of a circle: R² + S² > 0.
 fn any(proof: &mut Proof) -> Envelope<Exact> {
@@ -178,4 +181,59 @@ fn identity_a_circle_has_no_direction() {
 #[test]
 fn identity_a_circle_has_no_direction_twin() {
     rejects(&[(2, 1)], a_circle_has_no_direction);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// (R, S) at every scale, all around.
+fn directions() -> Vec<Inputs> {
+    let mirrored = |v: Inputs| v.into_iter().map(|i| -i).collect();
+    any_vector(2).into_iter().flat_map(|v: Inputs| [v.clone(), mirrored(v)]).collect()
+}
+
+/// θ of R and S themselves.
+struct AngleOf;
+
+impl Formula for AngleOf {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let zero = T::zero();
+        vec![Pendulum { e: zero, q: zero, r: x[0], s: x[1], l: zero }.angle()]
+    }
+}
+
+/// θ of an envelope in phase with the reference: Equation 4 of Equation 2.
+struct AngleOfEnvelope;
+
+impl Formula for AngleOfEnvelope {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![Envelope::new(x[0], T::zero(), x[1], T::zero()).pendulum().angle()]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-04.md#the-papers-arctangent
+    //= type=test
+    //# The angle MUST equal half the arctangent of S over R where R is positive.
+    #[test]
+    fn interval_the_angle() {
+        bounded::<T>(&AngleOf, &directions(), &ANGLE);
+    }
+
+    #[test]
+    fn interval_the_angle_twin() {
+        rejects_rounding::<T>(&AngleOf, &directions(), &ANGLE);
+    }
+
+    //= specs/equation-04.md#orientation-of-the-orbit
+    //= type=test
+    //# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+    #[test]
+    fn interval_the_angle_of_an_envelope() {
+        bounded::<T>(&AngleOfEnvelope, &any_vector(2), &ANGLE);
+    }
+
+    #[test]
+    fn interval_the_angle_of_an_envelope_twin() {
+        rejects_rounding::<T>(&AngleOfEnvelope, &any_vector(2), &ANGLE);
+    }
 }

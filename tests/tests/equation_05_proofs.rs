@@ -1,8 +1,11 @@
-//! Equation 5, proved: for all reals on the shipping source.
+//! Equation 5, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::{DetectionGains, Envelope, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::{any_vector, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::QUADRATURE;
 
 /// Any real gains.
 fn any_gains() -> DetectionGains<Exact> {
@@ -99,4 +102,40 @@ fn identity_a_reversed_channel_reverses_the_sign() {
 #[test]
 fn identity_a_reversed_channel_reverses_the_sign_twin() {
     rejects(WRONG, a_reversed_channel_reverses);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Gains of either sign are gains of one sign up to the sign of the result: it is enough to take both in [½, 1].
+fn gains_and_envelopes() -> Vec<Inputs> {
+    any_vector(4).into_iter().map(|e| [vec![octave(), octave()], e].concat()).collect()
+}
+
+/// Q_d as the product and as the quadrature of what is measured, relative to G_Dx G_Dy E.
+struct MeasuredQuadrature;
+
+impl Formula for MeasuredQuadrature {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let (g, e) = (DetectionGains { x: x[0], y: x[1] }, Envelope::new(x[2], x[3], x[4], x[5]));
+        vec![g.measured_quadrature(e.pendulum().q), g.measure(&e).pendulum().q]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        x[0] * x[1] * Envelope::new(x[2], x[3], x[4], x[5]).pendulum().e
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-05.md#product-of-the-gains
+    //= type=test
+    //# The measured quadrature MUST be the quadrature times both detection gains.
+    #[test]
+    fn interval_the_measured_quadrature() {
+        bounded::<T>(&MeasuredQuadrature, &gains_and_envelopes(), &QUADRATURE);
+    }
+
+    #[test]
+    fn interval_the_measured_quadrature_twin() {
+        rejects_rounding::<T>(&MeasuredQuadrature, &gains_and_envelopes(), &QUADRATURE);
+    }
 }

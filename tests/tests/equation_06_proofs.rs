@@ -1,8 +1,11 @@
-//! Equation 6, proved: for all reals on the shipping source.
+//! Equation 6, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::{DetectionGains, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{TOO_TIGHT, WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
+use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::ENERGY;
 
 /// Gains as the equation allows them: G_Dx other than zero, G_Dy any.
 fn any_gains() -> DetectionGains<Exact> {
@@ -183,4 +186,41 @@ fn identity_what_is_neglected_is_of_second_order() {
 #[test]
 fn identity_what_is_neglected_is_of_second_order_twin() {
     rejects(WRONG, what_is_neglected_is_of_second_order);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// G_Dx and E at every scale, G_Dy from a fifth to five times G_Dx, every angle.
+fn gains_energies_and_angles() -> Vec<Inputs> {
+    let ratios = [0.2, 0.45, 1.0, 2.2, 5.0];
+    ratios.windows(2).map(|r| vec![octave(), Interval::new(0.5 * r[0], r[1]), octave(), any_angle()]).collect()
+}
+
+/// E_d relative to max(G_Dx², G_Dy²) E.
+struct MeasuredEnergy;
+
+impl Formula for MeasuredEnergy {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![DetectionGains { x: x[0], y: x[1] }.measured_energy(x[2], x[3])]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        let largest = if x[0] < x[1] { x[1] } else { x[0] };
+        largest * largest * x[2]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-06.md#energy-of-the-measured-orbit
+    //= type=test
+    //# The measured energy MUST be the energy of the measured envelope.
+    #[test]
+    fn interval_the_measured_energy() {
+        bounded::<T>(&MeasuredEnergy, &gains_energies_and_angles(), &ENERGY);
+    }
+
+    #[test]
+    fn interval_the_measured_energy_twin() {
+        rejects_rounding::<T>(&MeasuredEnergy, &gains_energies_and_angles(), &ENERGY);
+    }
 }

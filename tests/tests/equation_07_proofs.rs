@@ -1,9 +1,12 @@
-//! Equation 7, proved: for all reals on the shipping source.
+//! Equation 7, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::detection::{angle_error, angle_error_bound, measured_angle};
 use cvg_model::{DetectionGains, Float, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{TOO_TIGHT, WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::{any_angle, any_ratio};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::{DETECTION_ANGLE, DETECTION_ERROR};
 
 /// Any ratio of gains, any angle.
 fn any() -> (Exact, Exact) {
@@ -386,4 +389,79 @@ fn identity_a_small_mismatch_makes_half_of_it_times_sin_2theta() {
 #[test]
 fn identity_a_small_mismatch_makes_half_of_it_times_sin_2theta_twin() {
     rejects(WRONG, a_small_mismatch_makes_half_of_it_times_sin_2theta);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Every angle, ratios from a fifth to five.
+fn ratios_and_angles() -> Vec<Inputs> {
+    vec![vec![any_ratio(), any_angle()]]
+}
+
+/// θ_d
+struct MeasuredAngle;
+
+impl Formula for MeasuredAngle {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![measured_angle(x[0], x[1])]
+    }
+}
+
+/// θ_error
+struct AngleError;
+
+impl Formula for AngleError {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![angle_error(x[0], x[1])]
+    }
+}
+
+/// The largest |θ_error|
+struct AngleErrorBound;
+
+impl Formula for AngleErrorBound {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![angle_error_bound(x[0])]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-07.md#angle-of-the-measured-orbit
+    //= type=test
+    //# The measured angle MUST be the angle of the measured envelope up to a multiple of 180°.
+    #[test]
+    fn interval_the_measured_angle() {
+        bounded::<T>(&MeasuredAngle, &ratios_and_angles(), &DETECTION_ANGLE);
+    }
+
+    #[test]
+    fn interval_the_measured_angle_twin() {
+        rejects_rounding::<T>(&MeasuredAngle, &ratios_and_angles(), &DETECTION_ANGLE);
+    }
+
+    //= specs/equation-07.md#closed-form-of-the-error
+    //= type=test
+    //# The error MUST be the measured angle less the true angle up to a multiple of 360°.
+    #[test]
+    fn interval_the_angle_error() {
+        bounded::<T>(&AngleError, &ratios_and_angles(), &DETECTION_ERROR);
+    }
+
+    #[test]
+    fn interval_the_angle_error_twin() {
+        rejects_rounding::<T>(&AngleError, &ratios_and_angles(), &DETECTION_ERROR);
+    }
+
+    //= specs/equation-07.md#bound
+    //= type=test
+    //# The magnitude of the error MUST NOT exceed the arcsine of |g − 1| over g + 1.
+    #[test]
+    fn interval_the_bound_of_the_angle_error() {
+        bounded::<T>(&AngleErrorBound, &[vec![any_ratio()]], &DETECTION_ERROR);
+    }
+
+    #[test]
+    fn interval_the_bound_of_the_angle_error_twin() {
+        rejects_rounding::<T>(&AngleErrorBound, &[vec![any_ratio()]], &DETECTION_ERROR);
+    }
 }

@@ -145,6 +145,9 @@ fn prop_each_force_moves_its_own_property_of_the_orbit() {
     approx::assert_relative_eq!(after.orbit().delta / dt, -0.5 / a, max_relative = 1e-5);
 }
 
+//= specs/equation-08.md#rotation-of-the-commands
+//= type=test
+//# The forces along the orbit MUST be the commanded forces turned by the angle error.
 #[test]
 fn snapshot_of_what_leaks_at_the_worst_angle() {
     let mut table = String::from("mismatch_percent  theta_error_deg  f_as/(G_A v_as)  f_qs/(G_A v_as)\n");

@@ -1,10 +1,13 @@
-//! Equation 8, proved: for all reals on the shipping source.
+//! Equation 8, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::actuation::misaligned_forces;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::MISALIGNED_FORCES;
 
 /// Any gain, any commands.
 fn any() -> (Exact, ControlOutputs<Exact>) {
@@ -191,4 +194,40 @@ fn identity_each_force_moves_its_own_property() {
 #[test]
 fn identity_each_force_moves_its_own_property_twin() {
     rejects(WRONG, each_force_moves_its_own_property);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Gain and commands at every scale: each force is linear in one command, whose sign it takes on.
+fn gains_commands_and_angles() -> Vec<Inputs> {
+    vec![vec![octave(), octave(), any_angle()]]
+}
+
+/// The four forces relative to G_A times the command that makes them.
+struct MisalignedForces;
+
+impl Formula for MisalignedForces {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let f = misaligned_forces(x[0], &ControlOutputs { v_as: x[1], v_qc: x[1] }, x[2]);
+        vec![f.a_s, f.q_s, f.a_c, f.q_c]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        x[0] * x[1]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-08.md#rotation-of-the-commands
+    //= type=test
+    //# The forces along the orbit MUST be the commanded forces turned by the angle error.
+    #[test]
+    fn interval_the_misaligned_forces() {
+        bounded::<T>(&MisalignedForces, &gains_commands_and_angles(), &MISALIGNED_FORCES);
+    }
+
+    #[test]
+    fn interval_the_misaligned_forces_twin() {
+        rejects_rounding::<T>(&MisalignedForces, &gains_commands_and_angles(), &MISALIGNED_FORCES);
+    }
 }

@@ -121,6 +121,9 @@ fn prop_at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
     assert!(along_y.x_s.abs() < 1e-15);
 }
 
+//= specs/equation-09.md#projection
+//= type=test
+//# Each channel MUST make its gain times the projection of both commands onto its axis.
 #[test]
 fn snapshot_of_the_forces_around_a_turn() {
     // G_Ax/G_Ay = 1.0113, as the paper identified

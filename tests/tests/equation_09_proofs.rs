@@ -1,8 +1,11 @@
-//! Equation 9, proved: for all reals on the shipping source.
+//! Equation 9, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::AXIS_FORCES;
 
 /// Any gains, any commands, any angle.
 fn any() -> (ActuationGains<Exact>, ControlOutputs<Exact>, Exact) {
@@ -144,4 +147,40 @@ fn identity_the_quadrature_command_moves_only_the_quadrature() {
 #[test]
 fn identity_the_quadrature_command_moves_only_the_quadrature_twin() {
     rejects(WRONG, the_quadrature_command_moves_only_the_quadrature);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Gain and commands at every scale: each force has the gain of its own channel and one command, whose sign it takes on.
+fn gains_commands_and_angles() -> Vec<Inputs> {
+    vec![vec![octave(), octave(), any_angle()]]
+}
+
+/// The four forces relative to the channel's gain times the command that makes them.
+struct AxisForcesOf;
+
+impl Formula for AxisForcesOf {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let f = ActuationGains { x: x[0], y: x[0] }.axis_forces(&ControlOutputs { v_as: x[1], v_qc: x[1] }, x[2]);
+        vec![f.x_c, f.x_s, f.y_c, f.y_s]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        x[0] * x[1]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-09.md#projection
+    //= type=test
+    //# Each channel MUST make its gain times the projection of both commands onto its axis.
+    #[test]
+    fn interval_the_axis_forces() {
+        bounded::<T>(&AxisForcesOf, &gains_commands_and_angles(), &AXIS_FORCES);
+    }
+
+    #[test]
+    fn interval_the_axis_forces_twin() {
+        rejects_rounding::<T>(&AxisForcesOf, &gains_commands_and_angles(), &AXIS_FORCES);
+    }
 }

@@ -1,9 +1,12 @@
-//! Equation 10, proved: for all reals on the shipping source.
+//! Equation 10, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_model::actuation::misaligned_forces;
 use cvg_model::{ActuationGains, ControlOutputs, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{TOO_TIGHT, WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
+use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::ORBIT_FORCES;
 
 /// Any gains, any commands, any angle.
 fn any() -> (ActuationGains<Exact>, ControlOutputs<Exact>, Exact) {
@@ -179,4 +182,40 @@ fn identity_the_leak_is_largest_at_45_degrees() {
 #[test]
 fn identity_the_leak_is_largest_at_45_degrees_twin() {
     rejects(&[(99, 100)], the_leak_is_largest_at_45_degrees);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// G_Ay and the command at every scale, G_Ax from a tenth to five, every angle.
+fn gains_commands_and_angles() -> Vec<Inputs> {
+    vec![vec![Interval::new(0.1, 5.0), octave(), octave(), any_angle()]]
+}
+
+/// The four forces relative to the larger gain times the command that makes them.
+struct OrbitForcesOf;
+
+impl Formula for OrbitForcesOf {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let f = ActuationGains { x: x[0], y: x[1] }.orbit_forces(&ControlOutputs { v_as: x[2], v_qc: x[2] }, x[3]);
+        vec![f.a_s, f.q_s, f.a_c, f.q_c]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        (if x[0] < x[1] { x[1] } else { x[0] }) * x[2]
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-10.md#equation-9-turned
+    //= type=test
+    //# The forces along the orbit MUST be those of Equation 9 turned back by the angle of the orbit.
+    #[test]
+    fn interval_the_orbit_forces() {
+        bounded::<T>(&OrbitForcesOf, &gains_commands_and_angles(), &ORBIT_FORCES);
+    }
+
+    #[test]
+    fn interval_the_orbit_forces_twin() {
+        rejects_rounding::<T>(&OrbitForcesOf, &gains_commands_and_angles(), &ORBIT_FORCES);
+    }
 }

@@ -1,10 +1,13 @@
-//! Equation 11, proved: for all reals on the shipping source.
+//! Equation 11, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_calibration::actuation::actuation_gain_ratio;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Orbit, Real};
-use cvg_prover::{Exact, Proof, Refusal};
-use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_tests::domain::octave;
+use cvg_tests::for_each_precision;
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::tolerances::ACTUATION_RATIO;
 
 /// Decay time and the output that makes up for the decay, with the pattern at `theta`.
 fn held_at(
@@ -102,4 +105,39 @@ fn identity_exchanging_the_ring_downs_inverts_the_ratio() {
 #[test]
 fn identity_exchanging_the_ring_downs_inverts_the_ratio_twin() {
     rejects(WRONG, exchanging_the_ring_downs_inverts_the_ratio);
+}
+
+// Rounding: bounds for all inputs of a box.
+
+/// Decay times and outputs at every scale; the sign of the ratio is that of the outputs' quotient.
+fn ring_downs_at_every_scale() -> Vec<Inputs> {
+    vec![vec![octave(); 4]]
+}
+
+/// The ratio of the gains, relative to itself.
+struct Ratio;
+
+impl Formula for Ratio {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![actuation_gain_ratio(x[0], x[1], x[2], x[3])]
+    }
+
+    fn scale<T: Real>(&self, x: &[T]) -> T {
+        actuation_gain_ratio(x[0], x[1], x[2], x[3])
+    }
+}
+
+for_each_precision! {
+    //= specs/equation-11.md#ratio-of-the-gains
+    //= type=test
+    //# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
+    #[test]
+    fn interval_the_ratio() {
+        bounded::<T>(&Ratio, &ring_downs_at_every_scale(), &ACTUATION_RATIO);
+    }
+
+    #[test]
+    fn interval_the_ratio_twin() {
+        rejects_rounding::<T>(&Ratio, &ring_downs_at_every_scale(), &ACTUATION_RATIO);
+    }
 }

@@ -90,7 +90,8 @@ impl Interval {
         let unit = Self::new(-1.0, 1.0);
         let quarters = self / QUARTER;
         let (first, last) = (quarters.lo.ceil(), quarters.hi.floor());
-        if !(quarters.magnitude() < MOST_QUARTERS) || last - first >= 3.0 {
+        let near = quarters.magnitude() < MOST_QUARTERS;
+        if !near || last - first >= 3.0 {
             return (unit, unit);
         }
         let ends = [sin_cos_of(self.lo), sin_cos_of(self.hi)];
