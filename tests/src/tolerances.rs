@@ -61,12 +61,18 @@ table! {
     /// Equation 9
     AXIS_FORCES: "Equation 9", 1e-15, 5e-7,
         "of max(G_Ax, G_Ay)(|v_as| + |v_qc|): one sine or cosine and two products";
+    /// Equation 9, inverted
+    ALLOCATION: "Equation 9, inverted", 8e-15, 4e-6,
+        "of 1 V, times the larger of ratio and 1/ratio: a rotation, an inverse of two by two, the drives, a rotation back";
     /// Equation 10
     ORBIT_FORCES: "Equation 10", 2e-15, 1e-6,
         "of max(G_Ax, G_Ay)(|v_as| + |v_qc|): a double angle a side against two single angles on the other";
     /// Equation 11
     ACTUATION_RATIO: "Equation 11", 2e-15, 1e-6,
         "relative: two products and a quotient a side, and as many for the common factor";
+    /// Length of the direction of the major axis
+    DIRECTION: "direction of the major axis", 2e-15, 1e-6,
+        "of 1: two roots, a quotient and the products and sums under them";
     /// Orbit → envelope → orbit
     ORBIT: "orbit and envelope", 2e-14, 1e-5,
         "of a, times E/√(R²+S²): Equation 4's error turns the orbit before its axes are read";

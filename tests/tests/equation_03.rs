@@ -106,6 +106,19 @@ for_each_scalar! {
             prop_assert!(state.integral.to_f64() * outward <= before * outward + slack, "{state:?} after {before:e}");
         }
     }
+
+    //= specs/equation-03.md#recovery
+    //= type=test
+    //# A finite error MUST be answered by the law or by the limit whatever the state was before.
+    #[test]
+    fn prop_a_finite_error_is_answered_after_any_bits(
+        (pi, _) in controllers::<T>(), integral in patterns::<T>(), before in patterns::<T>(), error in patterns::<T>(),
+    ) {
+        prop_assume!(error.is_finite());
+        let mut state = PiState { integral };
+        pi.control(&mut state, before);
+        prop_assert_ne!(pi.control(&mut state, error).status, Status::Invalid);
+    }
 }
 
 /// The paper's loop at a held angle: a resonator with losses and a frequency split, both controllers, Equation 9, and a

@@ -1,5 +1,7 @@
 //! Equation 9, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
+use cvg_controller::{ActuationCompensation, Allocation, OrbitCommands, Status};
+use cvg_model::effects::EffectId;
 use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float, Orbit, Real};
 use cvg_prover::{Exact, Formula, Proof, Refusal};
 use cvg_tests::domain::{any_angle, octave};
@@ -147,6 +149,42 @@ fn identity_the_quadrature_command_moves_only_the_quadrature() {
 #[test]
 fn identity_the_quadrature_command_moves_only_the_quadrature_twin() {
     rejects(WRONG, the_quadrature_command_moves_only_the_quadrature);
+}
+
+/// The allocation at three mismatches whose root is rational, for any command, any direction and any limit, wherever it
+/// is not at its limit: drives that are so mismatched make the forces along the orbit that were commanded.
+fn the_compensated_allocation_makes_what_was_commanded(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
+    let [v_as, v_qs, v_qc, v_ac] = ["v_as", "v_qs", "v_qc", "v_ac"].map(Exact::real);
+    let (theta, limit, zero) = (Exact::angle("θ"), Exact::positive("limit"), Exact::zero());
+    let (sin, cos) = theta.sin_cos();
+    for (numerator, denominator) in [(36, 25), (25, 36), (1, 1)] {
+        let values = [Exact::ratio(numerator, denominator), zero, zero, zero];
+        let inverse = ActuationCompensation::new(&[(EffectId::ActuationGainMismatch, values)]).expect("within bounds");
+        let allocation = Allocation::new(Some(inverse), limit).expect("a limit");
+        let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin);
+        if drive.status != Status::Within {
+            return Ok(());
+        }
+        let f = EffectId::ActuationGainMismatch.actuate(&values, drive.volts).along_orbit(theta);
+        proof.equal("f_as", f.a_s, planted * v_as)?;
+        proof.equal("f_qs", f.q_s, planted * v_qs)?;
+        proof.equal("f_qc", f.q_c, planted * v_qc)?;
+        proof.equal("f_ac", f.a_c, planted * v_ac)?;
+    }
+    Ok(())
+}
+
+//= specs/equation-09.md#inverse
+//= type=test
+//# The compensated allocation MUST make the forces along the orbit that were commanded.
+#[test]
+fn identity_the_compensated_allocation_makes_what_was_commanded() {
+    holds(the_compensated_allocation_makes_what_was_commanded);
+}
+
+#[test]
+fn identity_the_compensated_allocation_makes_what_was_commanded_twin() {
+    rejects(WRONG, the_compensated_allocation_makes_what_was_commanded);
 }
 
 // Rounding: bounds for all inputs of a box.
