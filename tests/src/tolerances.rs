@@ -54,7 +54,7 @@ table! {
         "rad: a sine, a product and an arctangent at angles up to π, and π itself is rounded by up to ε";
     /// Equation 7, closed form of the error
     DETECTION_ERROR: "Equation 7, θ_error", 1.2e-15, 6e-7,
-        "rad: up to g = 5 the roundings of both arguments and an arctangent within 2 units add up to 4.5 ε, as proved";
+        "rad: up to g = 5 the roundings of both arguments and an arctangent within 2 units stay below 5.5 ε, as proved";
     /// Equation 8
     MISALIGNED_FORCES: "Equation 8", 1e-15, 5e-7,
         "of G_A (|v_as| + |v_qc|): one sine or cosine and two products";

@@ -27,7 +27,7 @@ for_each_scalar! {
         prop_assert_near!(wrapped(p.angle().to_f64() - theta64, PI), 0.0, T::tolerance(&ANGLE) * condition(&p));
     }
 
-    //= specs/equation-04.md#the-papers-arctangent
+    //= specs/equation-04.md#arctangent-of-the-paper
     //= type=test
     //# The angle MUST equal half the arctangent of S over R where R is positive.
     /// The paper writes ½ arctan(S/R), which is right for R > 0 only; ½ atan2(S, R) agrees with it there.

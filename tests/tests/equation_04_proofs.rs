@@ -58,7 +58,7 @@ fn it_is_the_papers_arctangent(proof: &mut Proof, planted: Exact) -> Result<(), 
     proof.same_angle("2 θ_d", Exact::two() * angle, arctangent, one, r * r * r, &[(r, s)])
 }
 
-//= specs/equation-04.md#the-papers-arctangent
+//= specs/equation-04.md#arctangent-of-the-paper
 //= type=test
 //# The angle MUST equal half the arctangent of S over R where R is positive.
 #[test]
@@ -211,7 +211,7 @@ impl Formula for AngleOfEnvelope {
 }
 
 for_each_precision! {
-    //= specs/equation-04.md#the-papers-arctangent
+    //= specs/equation-04.md#arctangent-of-the-paper
     //= type=test
     //# The angle MUST equal half the arctangent of S over R where R is positive.
     #[test]

@@ -13,6 +13,14 @@ use crate::recording::{Run, RunKind};
 use crate::statistics::{line, robust_deviation};
 use crate::track::wrapped;
 
+//= specs/equation-11.md#ratio-of-the-gains
+//# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
+//= specs/equation-11.md#independence-of-the-set-amplitude
+//# A common factor on both control outputs MUST leave the ratio as it was.
+//= specs/equation-11.md#independence-of-a-common-gain
+//# A common factor on both actuation gains MUST leave the ratio as it was.
+//= specs/equation-11.md#exchange-of-the-runs
+//# Exchanging the two runs MUST invert the ratio.
 /// **Equation 11**, the ratio of the actuation gains from time constants and energy control outputs:
 ///
 /// $$\frac{G_{Ax}}{G_{Ay}} = \frac{\tau_{90}\,v_{as@90}}{\tau_0\,v_{as@0}}$$

@@ -22,6 +22,6 @@ mod world;
 
 pub use exact::Exact;
 pub use interval::Interval;
-pub use proof::{Proof, Proved, Refusal, Square, prove, refuted};
+pub use proof::{Proof, Proved, Refusal, SAMPLES, Square, prove, refuted};
 pub use rounded::{Format, Rounded};
-pub use search::{Bounded, Failure, Formula, bound_rounding};
+pub use search::{Bounded, Failure, Formula, MOST_POINTS, bound_rounding};

@@ -81,7 +81,7 @@ pub struct Proof {
 }
 
 /// Points that are drawn before a path counts as one on which nothing is.
-const SAMPLES: u64 = 512;
+pub const SAMPLES: u64 = 512;
 /// How far a claim may fail in floating point at a point, relative to the sizes involved, before it is refuted.
 const SLACK: f64 = 1e-6;
 /// More paths than this are refused.

@@ -65,7 +65,7 @@ impl fmt::Display for Failure {
 /// More boxes than this are not looked at.
 const MOST_BOXES: usize = 400_000;
 /// The machine is run in the middle of as many boxes.
-const MOST_POINTS: usize = 20_000;
+pub const MOST_POINTS: usize = 20_000;
 
 /// Shows that `factor` times what `F` computes is within `tolerance` · scale of the real value, for all inputs in each
 /// of the `boxes`. The factor is 1 but where an error is planted.
