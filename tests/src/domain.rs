@@ -3,6 +3,7 @@
 use core::f64::consts::PI;
 
 use cvg_model::{ActuationGains, ControlOutputs, DetectionGains, Envelope, Orbit};
+use cvg_prover::Interval;
 use proptest::prelude::*;
 
 use crate::Scalar;
@@ -75,6 +76,32 @@ pub fn patterns<T: Scalar>() -> impl Strategy<Value = T> {
 pub fn envelope_patterns<T: Scalar>() -> impl Strategy<Value = Envelope<T>> {
     let part = patterns::<T>;
     (part(), part(), part(), part()).prop_map(|(x_c, x_s, y_c, y_s)| Envelope::new(x_c, x_s, y_c, y_s))
+}
+
+/// Several turns in both directions: the angles of every interval bound.
+pub fn any_angle() -> Interval {
+    Interval::new(-4.0 * PI, 4.0 * PI)
+}
+
+/// Ratios of two gains as far as an identification looks for them.
+pub fn any_ratio() -> Interval {
+    Interval::new(0.2, 5.0)
+}
+
+/// −1 to 1
+pub fn unit() -> Interval {
+    Interval::new(-1.0, 1.0)
+}
+
+/// ½ to 1: every positive number times a power of two. Such a factor changes no rounding as long as nothing overflows or
+/// underflows, so that a bound which is relative to it holds at every scale.
+pub fn octave() -> Interval {
+    Interval::new(0.5, 1.0)
+}
+
+/// Vectors of `n` components of which one is the largest in magnitude, at every scale and up to their common sign.
+pub fn any_vector(n: usize) -> Vec<Vec<Interval>> {
+    (0..n).map(|largest| (0..n).map(|k| if k == largest { octave() } else { unit() }).collect()).collect()
 }
 
 /// `angle` less the nearest multiple of `period`.

@@ -2,12 +2,15 @@
 //! scalars every equation runs in.
 //!
 //! One file of `tests/` is one equation of the paper, one view of the mechanics, or one promise of the repository. The
-//! prefix of a test says what kind of evidence it is: `prop_` holds over a whole domain, `paper_` reproduces a number
-//! that the paper states, `snapshot_` keeps a table of derived values from changing unseen.
+//! prefix of a test says what kind of evidence it is: `identity_` is proved for all reals, `interval_` is a bound for all
+//! inputs of a box with rounding included, `prop_` was tried at random over a whole domain, `paper_` reproduces a number
+//! that the paper states, `snapshot_` keeps a table of derived values from changing unseen. Each proof `x` has a
+//! `x_twin`: the same claim with an error planted in it, which passes where the engine refutes it.
 #![forbid(unsafe_code)]
 
 pub mod bench;
 pub mod domain;
+pub mod proof;
 pub mod scalar;
 pub mod tolerances;
 
@@ -44,6 +47,23 @@ macro_rules! for_each_scalar {
             use $crate::{Scalar as _, model::Float as _};
             type T = f32;
             proptest::proptest! { #![proptest_config($crate::config())] $($properties)* }
+        }
+    };
+}
+
+/// Runs the proofs inside for `T = f64` and for `T = f32`.
+#[macro_export]
+macro_rules! for_each_precision {
+    ($($proofs:tt)*) => {
+        mod in_f64 {
+            use super::*;
+            type T = f64;
+            $($proofs)*
+        }
+        mod in_f32 {
+            use super::*;
+            type T = f32;
+            $($proofs)*
         }
     };
 }

@@ -28,9 +28,12 @@ macro_rules! table {
 }
 
 table! {
-    /// Equation 1
-    BIAS: "Equation 1", 2e-13, 1e-4,
+    /// Equation 1, the angle-dependent bias
+    BIAS: "Equation 1, its line taken out", 2e-13, 1e-4,
         "of the largest angle of the run: a mean over some hundred samples and a line over some hundred radians";
+    /// Equation 1, the angle itself
+    PATTERN_ANGLE: "Equation 1, θ", 4e-16, 2e-7,
+        "of the largest angle of the run: a product and a sum";
     /// Equation 2
     PENDULUM: "Equation 2", 4e-15, 2e-6,
         "of E: three products and two sums, after an orbit's sine, cosine and phase rotation: below 16 ε";
@@ -50,20 +53,26 @@ table! {
     DETECTION_ANGLE: "Equation 7", 3e-15, 1e-6,
         "rad: a sine, a product and an arctangent at angles up to π, and π itself is rounded by up to ε";
     /// Equation 7, closed form of the error
-    DETECTION_ERROR: "Equation 7, θ_error", 1e-15, 5e-7,
-        "rad: g ∓ 1 are rounded once; the denominator never cancels for g > 0, so the error is a few ε of the angle";
+    DETECTION_ERROR: "Equation 7, θ_error", 1.2e-15, 6e-7,
+        "rad: up to g = 5 the roundings of both arguments and an arctangent within 2 units stay below 5.5 ε, as proved";
     /// Equation 8
     MISALIGNED_FORCES: "Equation 8", 1e-15, 5e-7,
         "of G_A (|v_as| + |v_qc|): one sine or cosine and two products";
     /// Equation 9
     AXIS_FORCES: "Equation 9", 1e-15, 5e-7,
         "of max(G_Ax, G_Ay)(|v_as| + |v_qc|): one sine or cosine and two products";
+    /// Equation 9, inverted
+    ALLOCATION: "Equation 9, inverted", 8e-15, 4e-6,
+        "of 1 V, times the larger of ratio and 1/ratio: a rotation, an inverse of two by two, the drives, a rotation back";
     /// Equation 10
     ORBIT_FORCES: "Equation 10", 2e-15, 1e-6,
         "of max(G_Ax, G_Ay)(|v_as| + |v_qc|): a double angle a side against two single angles on the other";
     /// Equation 11
     ACTUATION_RATIO: "Equation 11", 2e-15, 1e-6,
         "relative: two products and a quotient a side, and as many for the common factor";
+    /// Length of the direction of the major axis
+    DIRECTION: "direction of the major axis", 2e-15, 1e-6,
+        "of 1: two roots, a quotient and the products and sums under them";
     /// Orbit → envelope → orbit
     ORBIT: "orbit and envelope", 2e-14, 1e-5,
         "of a, times E/√(R²+S²): Equation 4's error turns the orbit before its axes are read";

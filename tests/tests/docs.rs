@@ -5,6 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use cvg_model::effects::EffectId;
+use cvg_prover::Format;
+use cvg_tests::domain::{any_angle, any_ratio};
+use cvg_tests::tolerances::TABLE;
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the repository").to_owned()
@@ -15,12 +18,12 @@ fn read(path: impl AsRef<Path>) -> String {
     fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Files in `folder` whose names end in `extension`, sorted.
+/// What lies in `folder` with the extension `extension`, sorted; folders have none.
 fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
     let mut found: Vec<_> = fs::read_dir(repository().join(folder))
         .unwrap_or_else(|e| panic!("{folder}: {e}"))
         .map(|entry| entry.expect("a readable folder").path())
-        .filter(|path| path.extension().is_some_and(|e| e == extension))
+        .filter(|path| path.extension().map_or(extension.is_empty(), |e| e == extension))
         .collect();
     found.sort();
     found
@@ -79,27 +82,57 @@ fn requirements() -> Vec<(String, String)> {
     found
 }
 
-/// (requirement, quoted sentence) of every citation in the tests.
-fn citations() -> Vec<(String, String)> {
+/// Rust sources below a folder, sorted.
+fn rust_sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for file in files("tests/tests", "rs") {
-        let text = fs::read_to_string(&file).expect("readable");
-        let mut target = None;
+    for entry in fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())) {
+        let path = entry.expect("a readable folder").path();
+        if path.is_dir() {
+            found.extend(rust_sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// (requirement, quoted sentence) of every citation in `sources`. A quote may run over several lines.
+fn citations(sources: &[PathBuf]) -> Vec<(String, String)> {
+    let mut found: Vec<(String, String)> = Vec::new();
+    for file in sources {
+        let text = fs::read_to_string(file).expect("readable");
         for line in text.lines().map(str::trim) {
-            if let Some(t) = line.strip_prefix("//= specs/") {
-                target = Some(format!("specs/{t}"));
-            } else if let Some(quote) = line.strip_prefix("//# ") {
-                found.push((target.take().expect("a quote follows its target"), quote.to_owned()));
+            if let Some(target) = line.strip_prefix("//= specs/") {
+                found.push((format!("specs/{target}"), String::new()));
+            } else if let Some(part) = line.strip_prefix("//# ") {
+                let (_, quote) = found.last_mut().expect("a quote follows its target");
+                *quote += if quote.is_empty() { "" } else { " " };
+                *quote += part;
             }
         }
     }
     found
 }
 
+fn test_sources() -> Vec<PathBuf> {
+    files("tests/tests", "rs")
+}
+
+/// The code that ships, and the harnesses beside it.
+fn crate_sources() -> Vec<PathBuf> {
+    files("crates", "")
+        .into_iter()
+        .map(|c| c.join("src"))
+        .filter(|c| c.is_dir())
+        .flat_map(|c| rust_sources(&c))
+        .collect()
+}
+
 #[test]
 fn every_citation_of_a_requirement_is_word_for_word() {
     let requirements = requirements();
-    for (target, quote) in citations() {
+    for (target, quote) in citations(&[test_sources(), crate_sources()].concat()) {
         let (_, sentence) = requirements
             .iter()
             .find(|(name, _)| *name == target)
@@ -108,11 +141,103 @@ fn every_citation_of_a_requirement_is_word_for_word() {
     }
 }
 
+/// Requirements that none of `sources` cites.
+fn uncited(sources: &[PathBuf]) -> Vec<String> {
+    let cited: BTreeSet<_> = citations(sources).into_iter().map(|(target, _)| target).collect();
+    requirements().into_iter().map(|(name, _)| name).filter(|name| !cited.contains(name)).collect()
+}
+
 #[test]
 fn every_requirement_is_cited_by_a_test() {
-    let cited: BTreeSet<_> = citations().into_iter().map(|(target, _)| target).collect();
-    let left: Vec<_> = requirements().into_iter().map(|(name, _)| name).filter(|name| !cited.contains(name)).collect();
+    let left = uncited(&test_sources());
     assert!(left.is_empty(), "no test cites {left:?}");
+}
+
+#[test]
+fn every_requirement_is_cited_by_the_function_that_has_to_meet_it() {
+    let is_evidence = |path: &PathBuf| path.components().any(|c| c.as_os_str().to_string_lossy().starts_with("proof"));
+    let shipping: Vec<_> = crate_sources().into_iter().filter(|path| !is_evidence(path)).collect();
+    let left = uncited(&shipping);
+    assert!(left.is_empty(), "no function cites {left:?}");
+}
+
+/// Names of the test functions of a file, each with what follows it.
+fn tests_of(file: &str) -> Vec<String> {
+    let text = read(file);
+    let functions = text.split("#[test]").skip(1).filter_map(|after| after.split_once("fn "));
+    functions.filter_map(|(_, name)| name.split('(').next().map(str::to_owned)).collect()
+}
+
+#[test]
+fn every_equation_has_properties_snapshots_and_proofs_with_their_twins() {
+    for n in 1..=11 {
+        let tests = tests_of(&format!("tests/tests/equation_{n:02}.rs"));
+        for prefix in ["prop_", "snapshot_"] {
+            assert!(tests.iter().any(|t| t.starts_with(prefix)), "Equation {n} has no {prefix}");
+        }
+        let file = format!("tests/tests/equation_{n:02}_proofs.rs");
+        let proofs = tests_of(&file);
+        for prefix in ["identity_", "interval_"] {
+            assert!(proofs.iter().any(|t| t.starts_with(prefix)), "Equation {n} has no {prefix}");
+        }
+        assert!(read(&file).contains("for_each_precision!"), "Equation {n} has no bound in both precisions");
+    }
+}
+
+#[test]
+fn every_proof_has_its_twin_and_every_twin_its_proof() {
+    for file in test_sources() {
+        let name = format!("tests/tests/{}", file.file_name().expect("a file").to_string_lossy());
+        let tests = tests_of(&name);
+        for test in tests.iter().filter(|t| t.starts_with("identity_") || t.starts_with("interval_")) {
+            let other = test.strip_suffix("_twin").map_or_else(|| format!("{test}_twin"), str::to_owned);
+            assert!(tests.contains(&other), "{name}: {test} without {other}");
+        }
+    }
+}
+
+#[test]
+fn the_audit_repeats_the_table_of_tolerances() {
+    let audit = read("docs/src/audit.md");
+    for row in TABLE {
+        let number = |v: f64| format!("{v:e}");
+        let [of, reason] = [row.of, row.reason].map(|text| text.replace('|', "&#124;"));
+        let expected = format!("| {of} | {} | {} | {reason} |", number(row.f64), number(row.f32));
+        assert!(audit.lines().any(|line| line == expected), "docs/src/audit.md lacks {expected}");
+    }
+    let rows =
+        audit.lines().skip_while(|l| !l.starts_with("| of |")).skip(2).take_while(|l| l.starts_with('|')).count();
+    assert_eq!(rows, TABLE.len(), "rows that the table does not have");
+}
+
+#[test]
+fn the_audit_names_every_precondition() {
+    let audit = read("docs/src/audit.md");
+    for file in test_sources() {
+        let name = file.file_name().expect("a file").to_string_lossy().into_owned();
+        let assumes = fs::read_to_string(&file).expect("readable").contains(concat!("proof.assume_", "positive("));
+        assert_eq!(audit.contains(&format!("| `{name}` |")), assumes, "{name} in the table of preconditions");
+    }
+}
+
+#[test]
+fn the_audit_states_the_boxes_and_the_assumptions_as_they_are() {
+    let audit = read("docs/src/audit.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let (angle, ratio) = (any_angle(), any_ratio());
+    let degrees = |v: f64| v.to_degrees().round();
+    let expected = [
+        format!("angles from −{}° to {}°", -degrees(angle.lo), degrees(angle.hi)),
+        format!("ratios of detection gains from {} to {}", ratio.lo, ratio.hi),
+        format!("within {} unit in the last place (sine and cosine)", <f32 as Format>::SIN_COS_ULPS),
+        format!("{} units (arctangent)", <f32 as Format>::ATAN2_ULPS),
+        format!("up to {} points that obey", cvg_prover::SAMPLES),
+        format!("the middle of up to {},000 boxes", cvg_prover::MOST_POINTS / 1000),
+    ];
+    for text in expected {
+        assert!(audit.contains(&text), "docs/src/audit.md does not say: {text}");
+    }
+    assert_eq!(<f32 as Format>::SIN_COS_ULPS, <f64 as Format>::SIN_COS_ULPS);
+    assert_eq!(<f32 as Format>::ATAN2_ULPS, <f64 as Format>::ATAN2_ULPS);
 }
 
 #[test]

@@ -90,11 +90,27 @@ proptest! {
 }
 
 #[test]
-fn a_harmonic_of_the_pattern_survives_the_line() {
+fn prop_a_harmonic_of_the_pattern_survives_the_line() {
     let input: Vec<f64> = (0..10_000).map(|n| f64::from(n) * 20.0 * PI / 10_000.0).collect();
     let angle: Vec<_> = input.iter().map(|&i| pattern_angle(0.78, i, 0.2) + 0.01 * (4.0 * i).cos()).collect();
     let bias = angle_dependent_bias(&input, &angle);
     for (b, i) in bias.iter().zip(&input) {
         approx::assert_abs_diff_eq!(*b, 0.01 * (4.0 * i).cos(), epsilon = 1e-5);
     }
+}
+
+//= specs/equation-01.md#the-pattern-turns-against-the-input
+//= type=test
+//# The pattern angle MUST be the bias less the effective angular gain times the integral of the input rate.
+#[test]
+fn snapshot_of_the_angle_over_the_input_rotation() {
+    // k_e = 0.78 and a bias of 5°, as a whole-angle gyroscope shows them over a turn of its table
+    let mut table = String::from("input_deg  theta_deg  theta_deg_turned_back\n");
+    for input_deg in (0..=360_i32).step_by(45) {
+        let input = f64::from(input_deg).to_radians();
+        let there = pattern_angle(0.78, input, 5_f64.to_radians()).to_degrees();
+        let back = pattern_angle(0.78, -input, 5_f64.to_radians()).to_degrees();
+        table += &format!("{input_deg:9}{there:11.3}{back:23.3}\n");
+    }
+    insta::assert_snapshot!(table);
 }

@@ -124,20 +124,23 @@ for_each_scalar! {
 //= type=test
 //# The quadrature MUST be positive where Y follows X by a quarter of a period.
 #[test]
-fn the_sense_of_circulation_is_the_sign_of_the_quadrature() {
+fn prop_the_sense_of_circulation_is_the_sign_of_the_quadrature() {
     // x = cos φ, y = ½ sin φ runs counter-clockwise: y is positive a quarter period after x.
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, 0.5).pendulum().q, 1.0);
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, -0.5).pendulum().q, -1.0);
 }
 
 #[test]
-fn a_vibration_ahead_of_the_reference_has_negative_l() {
+fn prop_a_vibration_ahead_of_the_reference_has_negative_l() {
     // x = cos(φ + δ) = cos δ cos φ − sin δ sin φ
     let delta = 0.1_f64;
     let p = Envelope::new(delta.cos(), -delta.sin(), 0.0, 0.0).pendulum();
     approx::assert_relative_eq!(p.l, -(2.0 * delta).sin(), max_relative = 1e-14);
 }
 
+//= specs/equation-02.md#axes-and-orientation
+//= type=test
+//# The variables of an orbit MUST be E = a² + q², Q = 2aq, R = (a² − q²) cos 2θ, S = (a² − q²) sin 2θ and L = −(a² − q²) sin 2δ.
 #[test]
 fn snapshot_of_the_variables_around_a_turn() {
     let mut table = String::from("theta_deg      E      Q      R      S      L\n");

@@ -106,6 +106,19 @@ for_each_scalar! {
             prop_assert!(state.integral.to_f64() * outward <= before * outward + slack, "{state:?} after {before:e}");
         }
     }
+
+    //= specs/equation-03.md#recovery
+    //= type=test
+    //# A finite error MUST be answered by the law or by the limit whatever the state was before.
+    #[test]
+    fn prop_a_finite_error_is_answered_after_any_bits(
+        (pi, _) in controllers::<T>(), integral in patterns::<T>(), before in patterns::<T>(), error in patterns::<T>(),
+    ) {
+        prop_assume!(error.is_finite());
+        let mut state = PiState { integral };
+        pi.control(&mut state, before);
+        prop_assert_ne!(pi.control(&mut state, error).status, Status::Invalid);
+    }
 }
 
 /// The paper's loop at a held angle: a resonator with losses and a frequency split, both controllers, Equation 9, and a
@@ -186,7 +199,7 @@ proptest! {
 }
 
 #[test]
-fn the_quadrature_output_at_rest_is_the_anisoelasticity_of_that_angle() {
+fn prop_the_quadrature_output_at_rest_is_the_anisoelasticity_of_that_angle() {
     // Q̇ = −Δω sin 2(θ−θ_ω) + 2 v_qc (for a = 1, b = 1): v_qc = ½Δω sin 2(θ−θ_ω)
     let controlled = Loop::new(20.0, 1.0, 0.3);
     let (e, v) = controlled.run(Orbit { a: 1.0, q: 0.0, theta: 0.7, delta: 0.0 }.envelope(), 3.0);
@@ -195,7 +208,7 @@ fn the_quadrature_output_at_rest_is_the_anisoelasticity_of_that_angle() {
 }
 
 #[test]
-fn a_controller_outside_its_domain_is_refused_by_name() {
+fn prop_a_controller_outside_its_domain_is_refused_by_name() {
     for (n, name) in ["gain", "integration_time_s", "period_s", "limit_v"].into_iter().enumerate() {
         for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let mut p = [1.0; 4];
@@ -203,4 +216,27 @@ fn a_controller_outside_its_domain_is_refused_by_name() {
             assert_eq!(Pi::new(p[0], p[1], p[2], p[3]).expect_err("outside the domain").parameter, name);
         }
     }
+}
+
+//= specs/equation-03.md#no-windup
+//= type=test
+//# The integral MUST NOT grow in the direction in which the output is at its limit.
+/// A controller that is asked for more than its limit and then let go: it leaves the limit at once.
+#[test]
+fn snapshot_of_a_step_response_into_the_limit() {
+    let pi = Pi::new(2.0, 0.05, 0.01, 1.0).expect("inside the domain");
+    let mut state = PiState::default();
+    let mut table = String::from("  n   error    v_as  status   integral\n");
+    for n in 0..16_i32 {
+        let error = if (4..10).contains(&n) { 0.8 } else { 0.1 };
+        let error = if n < 12 { error } else { -0.2 };
+        let command: Command<f64> = pi.energy(&mut state, 1.0 + error, 1.0);
+        table += &format!(
+            "{n:3}{error:8.3}{:8.3}  {:8}{:9.4}\n",
+            command.volts,
+            format!("{:?}", command.status),
+            state.integral
+        );
+    }
+    insta::assert_snapshot!(table);
 }

@@ -27,7 +27,7 @@ for_each_scalar! {
         prop_assert_near!(wrapped(p.angle().to_f64() - theta64, PI), 0.0, T::tolerance(&ANGLE) * condition(&p));
     }
 
-    //= specs/equation-04.md#the-papers-arctangent
+    //= specs/equation-04.md#arctangent-of-the-paper
     //= type=test
     //# The angle MUST equal half the arctangent of S over R where R is positive.
     /// The paper writes ½ arctan(S/R), which is right for R > 0 only; ½ atan2(S, R) agrees with it there.
@@ -122,13 +122,13 @@ for_each_scalar! {
 //= type=test
 //# The angle of a circular orbit MUST be zero.
 #[test]
-fn a_circular_orbit_has_no_orientation_and_gives_zero() {
+fn prop_a_circular_orbit_has_no_orientation_and_gives_zero() {
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, 1.0).pendulum().angle(), 0.0);
     assert_eq!(Envelope::<f64>::zero().pendulum().angle(), 0.0);
 }
 
 #[test]
-fn the_four_quadrants_of_s_and_r_are_told_apart() {
+fn prop_the_four_quadrants_of_s_and_r_are_told_apart() {
     for theta_deg in [-80.0, -50.0, -40.0, -10.0, 10.0, 40.0, 50.0, 80.0, 90.0_f64] {
         let orbit = Orbit { a: 1.0, q: 0.0, theta: theta_deg.to_radians(), delta: 0.0 };
         approx::assert_relative_eq!(orbit.envelope().pendulum().angle().to_degrees(), theta_deg, max_relative = 1e-14);
@@ -136,9 +136,29 @@ fn the_four_quadrants_of_s_and_r_are_told_apart() {
 }
 
 #[test]
-fn quadrature_does_not_tilt_the_angle() {
+fn prop_quadrature_does_not_tilt_the_angle() {
     for q in [-0.9, -0.1, 0.0, 0.5] {
         let orbit = Orbit { a: 1.0, q, theta: 0.4, delta: 0.0 };
         approx::assert_relative_eq!(orbit.envelope().pendulum().angle(), 0.4, max_relative = 1e-14);
     }
+}
+
+//= specs/equation-04.md#orientation-of-the-orbit
+//= type=test
+//# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+#[test]
+fn snapshot_of_the_angle_over_orientation_and_quadrature() {
+    let shares = [0.0, 0.3, -0.3, 0.9];
+    let mut table = format!("theta_deg{}\n", shares.map(|q| format!("{:>12}", format!("q/a = {q}"))).concat());
+    for theta_deg in (-180..=180_i32).step_by(30) {
+        let row = shares.map(|q| {
+            let orbit = Orbit { a: 1.0, q, theta: f64::from(theta_deg).to_radians(), delta: 0.2 };
+            let angle = orbit.envelope().pendulum().angle().to_degrees();
+            // the two ends of the range are one state
+            let angle = if angle < -89.999 { angle + 180.0 } else { angle };
+            format!("{angle:12.3}").replace("-0.000", " 0.000")
+        });
+        table += &format!("{theta_deg:9}{}\n", row.concat());
+    }
+    insta::assert_snapshot!(table);
 }

@@ -61,6 +61,9 @@ for_each_scalar! {
     }
 }
 
+//= specs/equation-05.md#product-of-the-gains
+//= type=test
+//# The measured quadrature MUST be the quadrature times both detection gains.
 #[test]
 fn snapshot_of_the_measured_over_the_true_quadrature() {
     let mut table = String::from("mismatch_percent  Qd_over_Q  (G_Dx = 1)\n");

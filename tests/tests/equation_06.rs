@@ -112,7 +112,7 @@ for_each_scalar! {
 //= type=test
 //# The part of the measured energy that the equation neglects MUST be of second order in the semi-minor axis.
 #[test]
-fn a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
+fn prop_a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
     // Equation 6 is for q = 0; the part that it leaves out is of the order of q², not of q.
     let g = DetectionGains { x: 1.0, y: 1.0132 };
     let off = |q: f64| {
@@ -124,6 +124,9 @@ fn a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
     approx::assert_relative_eq!(off(0.02) / off(0.01), 4.0, max_relative = 1e-3);
 }
 
+//= specs/equation-06.md#energy-of-the-measured-orbit
+//= type=test
+//# The measured energy MUST be the energy of the measured envelope.
 #[test]
 fn snapshot_of_the_measured_over_the_true_energy() {
     let mismatches = [-1.32, 0.5, 1.32, 5.0];

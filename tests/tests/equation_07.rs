@@ -193,6 +193,9 @@ fn paper_1_32_percent_bends_the_angle_by_0_376_degrees() {
     assert!((bound_deg - 0.3757).abs() < 5e-5, "{bound_deg}");
 }
 
+//= specs/equation-07.md#closed-form-of-the-error
+//= type=test
+//# The error MUST be the measured angle less the true angle up to a multiple of 360°.
 /// Figure 2 shows θ_error over θ for several mismatches. Its values are not given as numbers; these are the curve at
 /// the paper's identified mismatch and around it.
 #[test]

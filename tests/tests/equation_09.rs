@@ -2,10 +2,12 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
+use cvg_controller::{ActuationCompensation, Allocation, OrbitCommands, Status};
+use cvg_model::effects::EffectId;
 use cvg_model::{ActuationGains, ControlOutputs, Orbit};
-use cvg_tests::domain::{actuation_gains, angles, outputs, sizes};
+use cvg_tests::domain::{actuation_gains, angles, outputs, ratios, sizes};
 use cvg_tests::scalar::rounded;
-use cvg_tests::tolerances::AXIS_FORCES;
+use cvg_tests::tolerances::{ALLOCATION, AXIS_FORCES};
 use cvg_tests::{Scalar, for_each_scalar, prop_assert_near};
 use proptest::prelude::*;
 
@@ -70,6 +72,33 @@ for_each_scalar! {
             (two * f.x_c, two * f.x_s, two * f.y_c, two * f.y_s)
         );
     }
+
+    //= specs/equation-09.md#inverse
+    //= type=test
+    //# The compensated allocation MUST make the forces along the orbit that were commanded.
+    #[test]
+    fn prop_the_compensated_allocation_makes_what_was_commanded(
+        v in proptest::array::uniform4(-1.0..1.0_f64), theta in angles(), ratio in ratios(), skew in -0.5..0.5_f64,
+    ) {
+        let [zero, limit] = [0.0, 1e3].map(T::from_f64);
+        // the drives act in the library's order: gains, then skew
+        let effects = [
+            (EffectId::ActuationGainMismatch, [T::from_f64(ratio), zero, zero, zero]),
+            (EffectId::ActuationSkew, [T::from_f64(skew), zero, zero, zero]),
+        ];
+        let inverse = ActuationCompensation::new(&effects).expect("within bounds");
+        let allocation = Allocation::new(Some(inverse), limit).expect("a limit");
+        let [v_as, v_qs, v_qc, v_ac] = v.map(T::from_f64);
+        let theta = T::from_f64(theta);
+        let (sin, cos) = cvg_model::Real::sin_cos(theta);
+        let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin);
+        prop_assert_eq!(drive.status, Status::Within);
+        let f = effects.iter().fold(drive.volts, |f, (id, values)| id.actuate(values, f)).along_orbit(theta);
+        let tolerance = T::tolerance(&ALLOCATION) * ratio.max(1.0 / ratio);
+        for (made, commanded) in [(f.a_s, v_as), (f.q_s, v_qs), (f.q_c, v_qc), (f.a_c, v_ac)] {
+            prop_assert_near!(made.to_f64(), commanded.to_f64(), tolerance);
+        }
+    }
 }
 
 proptest! {
@@ -111,7 +140,7 @@ proptest! {
 }
 
 #[test]
-fn at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
+fn prop_at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
     let gains = ActuationGains { x: 2.0, y: 3.0 };
     let v = ControlOutputs { v_as: 1.0, v_qc: 0.0 };
     let along_x = gains.axis_forces(&v, 0.0);
@@ -121,6 +150,9 @@ fn at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
     assert!(along_y.x_s.abs() < 1e-15);
 }
 
+//= specs/equation-09.md#projection
+//= type=test
+//# Each channel MUST make its gain times the projection of both commands onto its axis.
 #[test]
 fn snapshot_of_the_forces_around_a_turn() {
     // G_Ax/G_Ay = 1.0113, as the paper identified

@@ -92,3 +92,24 @@ fn paper_1_13_percent_is_told_apart_from_anisodamping() {
     approx::assert_relative_eq!(actuation_gain_ratio(tau_0, v_0, tau_90, v_90), 1.0113, max_relative = 1e-12);
     assert!((v_90 / v_0 - 1.0113).abs() > 0.05, "the outputs alone say {}", v_90 / v_0);
 }
+
+//= specs/equation-11.md#ratio-of-the-gains
+//= type=test
+//# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
+#[test]
+fn snapshot_of_the_ratio_over_mismatch_and_anisodamping() {
+    let shares = [-0.1, 0.0, 0.0517];
+    let mut table = String::from("G_Ax/G_Ay  anisodamping_per_s  v_90/v_0  ratio\n");
+    for ratio in [0.98, 1.0, 1.0113, 1.18] {
+        for anisodamping in shares {
+            let resonator = resonator(22.0, Anisotropy { cos2: anisodamping * 2.0 / 22.0, sin2: 0.0 });
+            let drive = ActuationGains { x: ratio, y: 1.0 };
+            let (tau_0, v_0) = held_at(0.0, &resonator, &drive, 1.0);
+            let (tau_90, v_90) = held_at(FRAC_PI_2, &resonator, &drive, 1.0);
+            let found = actuation_gain_ratio(tau_0, v_0, tau_90, v_90);
+            let anisodamping = format!("{:20.5}", anisodamping * 2.0 / 22.0);
+            table += &format!("{ratio:9.4}{anisodamping}{:10.4}{found:7.4}\n", v_90 / v_0);
+        }
+    }
+    insta::assert_snapshot!(table);
+}

@@ -61,6 +61,8 @@ impl<T: Float> ActuationCompensation<T> {
         })
     }
 
+    //= specs/equation-09.md#inverse
+    //# The compensated allocation MUST make the forces along the orbit that were commanded.
     #[inline]
     fn apply(&self, f: AxisForces<T>) -> AxisForces<T> {
         AxisForces {
@@ -97,6 +99,8 @@ impl<T: Float> Allocation<T> {
         Ok(Self { compensation, limit_v: positive(limit_v, "limit_v")? })
     }
 
+    //= specs/electronics.md#drives-within-their-limit
+    //# Each drive MUST get a finite voltage within its limit for every command and every direction.
     /// The drives' commands for an orbit along (`cos`, `sin`): Equation 9 at unit gains, completed by the forces it
     /// does not use (v_qs along the minor axis, v_ac along the major one):
     ///

@@ -15,12 +15,18 @@ use cvg_model::{Float, Real};
 
 use crate::{Command, ConfigError, Status, positive};
 
+//= specs/equation-03.md#stable-loop
+//# The averaged loop of energy and controller MUST be stable for every positive gain and every positive integration time.
 /// The law that both controllers of Equation 3 share, K[e + (1/2τ)∫e dt].
 #[inline]
 fn law<T: Real>(gain: T, integration_time_s: T, error: T, integral: T) -> T {
     gain * (error + integral / (T::two() * integration_time_s))
 }
 
+//= specs/equation-03.md#signs
+//# The energy output MUST be positive where the measured energy stays above its set value, and the quadrature output MUST be negative where the measured quadrature stays positive.
+//= specs/equation-03.md#proportional-part
+//# A step of the error MUST change the output at once by the gain times the step.
 /// **Equation 3**, the energy controller:
 ///
 /// $$v_{as} = +K_E\left[E_d - E_0 + \frac{1}{2\tau_E}\int (E_d-E_0)\,dt\right]$$
@@ -136,6 +142,14 @@ impl<T: Float> Pi<T> {
         self.step(state, e, law)
     }
 
+    //= specs/equation-03.md#integral-part
+    //# A constant error MUST change the output by the gain times the error times the time over twice the integration time.
+    //= specs/equation-03.md#bounded-output
+    //# The output MUST be finite and within its limit for every input.
+    //= specs/equation-03.md#no-windup
+    //# The integral MUST NOT grow in the direction in which the output is at its limit.
+    //= specs/equation-03.md#recovery
+    //# A finite error MUST be answered by the law or by the limit whatever the state was before.
     /// One sample of `controller` on the error `e`: proportional part of this sample, integral up to and including it.
     ///
     /// The integral stops growing where the command is limited and the error would push it further (conditional

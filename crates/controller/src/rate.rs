@@ -77,6 +77,8 @@ impl<T: Float> RateLoop<T> {
         Ok(Self { pi, limit_v: positive(limit_v, "limit_v")? })
     }
 
+    //= specs/electronics.md#heading-within-its-limit
+    //# The output that holds the pattern MUST be finite and within its limit for every input and every state.
     /// v_qs for the pendulum variables `p`. Total.
     #[inline]
     pub fn step(&self, state: &mut PiState<T>, p: &Pendulum<T>, target: &Heading<T>) -> Command<T> {

@@ -88,6 +88,14 @@ impl<T: Float> PatternAngle<T> {
         self.period
     }
 
+    //= specs/equation-04.md#unwrapping
+    //# The unwrapped angle MUST follow the pattern over any number of turns as long as it turns less than 90° from one sample to the next.
+    //= specs/electronics.md#reading-within-its-period
+    //# The reading of the pattern angle MUST be finite and within half its period of zero for every input and every state.
+    //= specs/electronics.md#reading-is-held
+    //# An envelope without a direction MUST leave the reading as it was and say so.
+    //= specs/electronics.md#reading-recovers
+    //# The first envelope with a direction MUST give the angle of that envelope whatever was read before.
     /// Reads the angle of `e` and counts the periods passed.
     ///
     /// Total: an envelope without a direction, or not finite, holds the last reading and says so; a state of any

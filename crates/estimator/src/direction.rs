@@ -19,6 +19,12 @@ pub struct Direction<T> {
     pub status: Status,
 }
 
+//= specs/electronics.md#direction-is-bounded
+//# The components of the direction of the major axis MUST be finite and below two in magnitude for every input.
+//= specs/electronics.md#direction-is-a-unit-vector
+//# The direction of the major axis MUST have the length one up to rounding.
+//= specs/electronics.md#direction-of-equation-4
+//# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
 /// The direction of **Equation 4** by half-angle algebra instead of ½ atan2(S, R).
 ///
 /// With ρ = √(R² + S²), 2ρ cos²θ = ρ + R, 2ρ sin²θ = ρ − R and 2ρ sin θ cos θ = S. So the direction is

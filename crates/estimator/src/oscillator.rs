@@ -68,6 +68,10 @@ impl<T: Float> PhaseLock<T> {
         Ok(Self { gain_per_s: gain, integral_gain_per_s: bandwidth * bandwidth * period, limit_rad_s: limit })
     }
 
+    //= specs/electronics.md#correction-within-its-limit
+    //# The frequency correction MUST be finite and within its limit for every input and every state.
+    //= specs/electronics.md#correction-is-held
+    //# Pendulum variables that hold no phase MUST leave the integral part of the correction as it was.
     /// The correction for the pendulum variables `p`. Total; holds the integral where there is no phase to measure.
     #[inline]
     pub fn step(&self, state: &mut LockState<T>, p: &Pendulum<T>) -> Correction<T> {

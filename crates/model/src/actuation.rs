@@ -51,6 +51,18 @@ pub struct AxisForces<T> {
     pub y_s: T,
 }
 
+//= specs/equation-08.md#rotation-of-the-commands
+//# The forces along the orbit MUST be the commanded forces turned by the angle error.
+//= specs/equation-08.md#isometry
+//# The size of the forces that one command makes along both axes of the orbit MUST be the gain times the command.
+//= specs/equation-08.md#aligned-forces
+//# Without an angle error each command MUST act on its own axis only.
+//= specs/equation-08.md#leak-follows-the-sign-of-the-error
+//# Reversing the angle error MUST reverse the forces on the wrong axes and leave those on the right axes as they were.
+//= specs/equation-08.md#projection-at-the-measured-angle
+//# The forces MUST be those of the projection at the measured angle with equal gains, seen along the true orbit.
+//= specs/equation-08.md#precession-by-a-misaligned-energy-controller
+//# An energy controller that balances the damping at a wrong orientation MUST precess the pattern at the tangent of the angle error over the decay time.
 /// **Equation 8**, the forces along the true orbit when they are applied at an orientation wrong by `theta_error` (rad):
 ///
 /// $$f_{as} = G_A v_{as}\cos\theta_{error},\quad f_{qs} = G_A v_{as}\sin\theta_{error},$$
@@ -70,6 +82,16 @@ pub fn misaligned_forces<T: Real>(gain: T, v: &ControlOutputs<T>, theta_error: T
 }
 
 impl<T: Real> ActuationGains<T> {
+    //= specs/equation-09.md#projection
+    //# Each channel MUST make its gain times the projection of both commands onto its axis.
+    //= specs/equation-09.md#half-a-turn-reverses-the-forces
+    //# Turning the orientation by 180° MUST reverse every force.
+    //= specs/equation-09.md#linear
+    //# Doubling the commands MUST double every force exactly.
+    //= specs/equation-09.md#energy-command
+    //# With equal gains the energy command MUST change the energy only, and take it out where the command is positive.
+    //= specs/equation-09.md#quadrature-command
+    //# With equal gains the quadrature command MUST change the quadrature only, and add to it where the command is positive.
     /// **Equation 9**, the forces along X and Y when the commands are projected at `theta` (rad):
     ///
     /// $$f_{xc} = -G_{Ax} v_{qc}\sin\theta,\quad f_{xs} = G_{Ax} v_{as}\cos\theta,$$
@@ -93,6 +115,20 @@ impl<T: Real> ActuationGains<T> {
         }
     }
 
+    //= specs/equation-10.md#equation-9-turned
+    //# The forces along the orbit MUST be those of Equation 9 turned back by the angle of the orbit.
+    //= specs/equation-10.md#mean-gain
+    //# The force of a command along its own axis MUST be the command times the gains weighted by the squared direction cosines of that axis.
+    //= specs/equation-10.md#equal-gains-leave-equation-8
+    //# Equal gains MUST give the forces of Equation 8 without an angle error, exactly.
+    //= specs/equation-10.md#sum-and-product
+    //# The sum and the product of the principal values of the map from commands to forces MUST be those of the two gains.
+    //= specs/equation-10.md#between-the-gains
+    //# The magnitude of the energy force MUST lie between the command times the smaller and the command times the larger gain.
+    //= specs/equation-10.md#exchange-of-the-axes
+    //# Exchanging the gains and taking the angle from 90° MUST reverse the forces on the wrong axes and leave those on the right axes as they were.
+    //= specs/equation-10.md#where-the-leak-is
+    //# The force on the wrong axis MUST be largest at 45°, where it is half the difference of the gains times the command, and zero at every multiple of 90°.
     /// **Equation 10**, the same forces along the orbit at `theta` (rad):
     ///
     /// $$f_{as} = \tfrac12(G_{Ay}-G_{Ax})v_{as}(1-\cos 2\theta) + G_{Ax}v_{as},\quad
@@ -127,6 +163,8 @@ impl<T: Real> AxisForces<T> {
         }
     }
 
+    //= specs/equation-08.md#what-each-force-moves
+    //# Each force along the orbit MUST move the property of the orbit that is its own: f_as the amplitude, f_qs the orientation, f_qc the quadrature and f_ac the phase, with the signs −, −, + and −.
     /// The rate at which these forces move the envelope: F/(2iω) with F = f_c − i f_s, so that the in-phase part
     /// moves at −f_s/2ω and the quadrature part at +f_c/2ω. `two_omega` = 2ω in rad/s, ≠ 0.
     #[inline]

@@ -25,6 +25,14 @@ impl<T: Real> DetectionGains<T> {
         self.y / self.x
     }
 
+    //= specs/equation-05.md#product-of-the-gains
+    //# The measured quadrature MUST be the quadrature times both detection gains.
+    //= specs/equation-05.md#zero-is-kept
+    //# The measured quadrature of an orbit without quadrature MUST be zero.
+    //= specs/equation-05.md#sign-is-kept
+    //# Detection gains of one sign MUST keep the sign of the quadrature.
+    //= specs/equation-05.md#reversed-channel
+    //# Reversing one channel MUST reverse the sign of the measured quadrature.
     /// **Equation 5**, the quadrature that the electronics see:
     ///
     /// $$Q_d = G_{Dx} G_{Dy} Q$$
@@ -36,6 +44,22 @@ impl<T: Real> DetectionGains<T> {
         self.x * self.y * q
     }
 
+    //= specs/equation-06.md#energy-of-the-measured-orbit
+    //# The measured energy MUST be the energy of the measured envelope.
+    //= specs/equation-06.md#extremes
+    //# The measured energy MUST lie between the energy times the smaller and the energy times the larger squared gain.
+    //= specs/equation-06.md#where-the-extremes-are
+    //# The measured energy MUST be the energy times the squared gain of X at 0° and of Y at 90°.
+    //= specs/equation-06.md#equal-gains
+    //# Equal gains MUST make the measured energy independent of the angle.
+    //= specs/equation-06.md#even-in-the-angle
+    //# The measured energy MUST be the same at opposite angles.
+    //= specs/equation-06.md#sign-of-a-channel
+    //# Reversing one channel MUST leave the measured energy as it was.
+    //= specs/equation-06.md#mean-over-a-turn
+    //# The mean of the measured energy over a turn MUST be the energy times the mean of the squared gains.
+    //= specs/equation-06.md#neglected-quadrature
+    //# The part of the measured energy that the equation neglects MUST be of second order in the semi-minor axis.
     /// **Equation 6**, the energy that the electronics see on a line orbit (q = 0) at pattern angle `theta` (rad):
     ///
     /// $$E_d = G_{Dx}^2 E\left[1 + \frac{1-\cos 2\theta}{2}\left(\frac{G_{Dy}^2}{G_{Dx}^2}-1\right)\right]$$
@@ -49,6 +73,16 @@ impl<T: Real> DetectionGains<T> {
     }
 }
 
+//= specs/equation-07.md#angle-of-the-measured-orbit
+//# The measured angle MUST be the angle of the measured envelope up to a multiple of 180°.
+//= specs/equation-07.md#group
+//# Two mismatches one after the other MUST give the angle of the single mismatch with the product of their ratios.
+//= specs/equation-07.md#inverse
+//# The inverse ratio MUST undo the mismatch up to a multiple of 360°.
+//= specs/equation-07.md#quadrant
+//# The measured angle MUST lie in the quadrant of the true angle.
+//= specs/equation-07.md#total
+//# The measured angle, the error and the bound MUST lie within 180° of zero or be NaN.
 /// **Equation 7**, the pattern angle that the electronics see, rad in (−π, π]:
 ///
 /// $$\theta_d = \operatorname{atan2}\left(\frac{G_{Dy}}{G_{Dx}}\sin\theta,\ \cos\theta\right)$$
@@ -61,6 +95,22 @@ pub fn measured_angle<T: Real>(g: T, theta: T) -> T {
     (g * sin).atan2(cos)
 }
 
+//= specs/equation-07.md#closed-form-of-the-error
+//# The error MUST be the measured angle less the true angle up to a multiple of 360°.
+//= specs/equation-07.md#zeros
+//# The error MUST be zero at every multiple of 90°.
+//= specs/equation-07.md#no-other-zeros
+//# The error MUST have the sign of g − 1 between 0° and 90° and the opposite sign between 90° and 180°.
+//= specs/equation-07.md#odd
+//# The error MUST change its sign with the angle.
+//= specs/equation-07.md#period
+//# The error MUST repeat after 180°.
+//= specs/equation-07.md#exchange-of-the-axes
+//# The error for the inverse ratio at 90° less the angle MUST be the error with its sign reversed.
+//= specs/equation-07.md#no-mismatch
+//# Equal gains MUST give an error of exactly zero.
+//= specs/equation-07.md#small-mismatch
+//# The error MUST be half the mismatch times the sine of twice the angle up to the square of the mismatch.
 /// θ_error = θ_d − θ of Equation 7 in closed form, rad:
 ///
 /// $$\theta_{error} = \operatorname{atan2}\left((g-1)\sin 2\theta,\ (g+1)-(g-1)\cos 2\theta\right)$$
@@ -74,6 +124,10 @@ pub fn angle_error<T: Real>(g: T, theta: T) -> T {
     (m * sin_2theta).atan2(p - m * cos_2theta)
 }
 
+//= specs/equation-07.md#bound
+//# The magnitude of the error MUST NOT exceed the arcsine of |g − 1| over g + 1.
+//= specs/equation-07.md#where-the-bound-is-attained
+//# The magnitude of the error MUST equal its bound where the cosine of twice the angle is g − 1 over g + 1.
 /// The largest |θ_error| over all θ for a ratio `g` > 0, rad: asin(|g−1|/(g+1)).
 ///
 /// Attained where cos 2θ = (g−1)/(g+1).

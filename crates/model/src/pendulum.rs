@@ -85,6 +85,22 @@ impl<T: Real> Envelope<T> {
         )
     }
 
+    //= specs/equation-02.md#axes-and-orientation
+    //# The variables of an orbit MUST be E = a² + q², Q = 2aq, R = (a² − q²) cos 2θ, S = (a² − q²) sin 2θ and L = −(a² − q²) sin 2δ.
+    //= specs/equation-02.md#energy-identity
+    //# The square of E MUST equal the sum of the squares of Q, R and S.
+    //= specs/equation-02.md#rotation-of-the-pattern
+    //# Turning the pattern by an angle MUST turn the point (R, S) by twice that angle and leave E and Q as they were.
+    //= specs/equation-02.md#phase-of-the-reference
+    //# Shifting the phase of the reference MUST leave E, Q, R and S as they were.
+    //= specs/equation-02.md#half-a-turn
+    //# The variables of an orbit and of the same orbit turned by 180° MUST be identical bit for bit.
+    //= specs/equation-02.md#sense-of-circulation
+    //# The quadrature MUST be positive where Y follows X by a quarter of a period.
+    //= specs/equation-02.md#energy-is-not-negative
+    //# The energy MUST be zero or more, or NaN where a component of the envelope is NaN.
+    //= specs/equation-02.md#energy-bounds-the-orientation
+    //# The magnitude of R MUST NOT exceed E.
     /// **Equation 2**, the pendulum variables:
     ///
     /// $$E = x_c^2+x_s^2+y_c^2+y_s^2,\quad Q = 2(x_c y_s - y_c x_s),$$
@@ -104,6 +120,8 @@ impl<T: Real> Envelope<T> {
         }
     }
 
+    //= specs/equation-02.md#rates
+    //# The rates of the variables MUST be the derivatives of the variables along the rate of the envelope.
     /// The rates of the pendulum variables when the envelope changes at `rate`: the derivative of Equation 2.
     #[inline]
     pub fn pendulum_rate(&self, rate: &Self) -> Pendulum<T> {
@@ -170,6 +188,22 @@ impl<T: Real> Orbit<T> {
 }
 
 impl<T: Real> Pendulum<T> {
+    //= specs/equation-04.md#orientation-of-the-orbit
+    //# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+    //= specs/equation-04.md#arctangent-of-the-paper
+    //# The angle MUST equal half the arctangent of S over R where R is positive.
+    //= specs/equation-04.md#rotation-turns-the-angle
+    //# Turning the pattern by an angle MUST change the angle by as much, up to a multiple of 180°.
+    //= specs/equation-04.md#independence-of-amplitude
+    //# Scaling the envelope by a power of two MUST leave the angle as it was, bit for bit.
+    //= specs/equation-04.md#independence-of-phase
+    //# Shifting the phase of the reference MUST leave the angle as it was.
+    //= specs/equation-04.md#half-a-turn-is-the-same-angle
+    //# The angle of an orbit and of the same orbit turned by 180° MUST be identical bit for bit.
+    //= specs/equation-04.md#range
+    //# The angle MUST lie within 90° of zero, or be NaN where R or S is NaN.
+    //= specs/equation-04.md#circle
+    //# The angle of a circular orbit MUST be zero.
     /// **Equation 4**, the pattern angle, within [−90°, 90°] as radians (the two ends are one state):
     ///
     /// $$\theta = \tfrac12 \operatorname{atan2}(S, R)$$

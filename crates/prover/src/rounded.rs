@@ -1,0 +1,323 @@
+//! The scalar of rounding errors: a real value that is enclosed, and how far the machine's value can be from it.
+//!
+//! The shipping functions run on it through [`Real`]. Each operation adds the error that one correct rounding can make
+//! (a unit roundoff of the result, and half the smallest number where a product or quotient may underflow) to what the
+//! errors of the operands become. Sine, cosine and arctangent are those of `libm`, taken to be within
+//! [`Format::SIN_COS_ULPS`] and [`Format::ATAN2_ULPS`]:
+//! an assumption, to which the real functions are held by a test.
+
+use std::cell::RefCell;
+use std::cmp::Ordering;
+use std::marker::PhantomData;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use cvg_model::{Float, Real};
+
+use crate::Interval;
+
+/// A machine number whose roundings are accounted for.
+pub trait Format: Float + 'static {
+    /// the relative error of one rounding to nearest
+    const UNIT: f64;
+    /// half of the smallest positive number
+    const TINY: f64;
+    /// the largest number
+    const LARGEST: f64;
+    /// how far `libm`'s sine and cosine are taken to be from the real value, in units in the last place
+    const SIN_COS_ULPS: f64 = 1.0;
+    /// how far `libm`'s arctangent is taken to be from the real value, in units in the last place
+    const ATAN2_ULPS: f64 = 2.0;
+}
+
+impl Format for f32 {
+    const UNIT: f64 = 5.960_464_477_539_063e-8;
+    const TINY: f64 = 7.1e-46;
+    const LARGEST: f64 = f32::MAX as f64;
+}
+
+impl Format for f64 {
+    const UNIT: f64 = 1.110_223_024_625_156_5e-16;
+    const TINY: f64 = 5e-324;
+    const LARGEST: f64 = f64::MAX;
+}
+
+/// What an evaluation in `F` and the real numbers make of the same inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounded<F> {
+    /// holds the real value
+    pub real: Interval,
+    /// how far the machine's value can be from the real one; infinite where nothing is known
+    pub error: f64,
+    /// an angle near ±180°, whose two values may be a whole turn apart besides the error
+    pub wraps: bool,
+    format: PhantomData<F>,
+}
+
+/// The smallest number that is not below a + b, for a, b ≥ 0.
+fn sum(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 { a + b } else { (a + b).next_up() }
+}
+
+/// The smallest number that is not below a · b, for a, b ≥ 0; infinite where either is, since that stands for unknown.
+fn product(a: f64, b: f64) -> f64 {
+    if a.is_infinite() || b.is_infinite() {
+        f64::INFINITY
+    } else if a == 0.0 || b == 0.0 {
+        0.0
+    } else {
+        (a * b).next_up()
+    }
+}
+
+/// A number that is not below a / b, for a ≥ 0; infinite where b may be 0.
+fn quotient(a: f64, b: f64) -> f64 {
+    if a == 0.0 {
+        0.0
+    } else if b > 0.0 {
+        (a / b).next_up()
+    } else {
+        f64::INFINITY
+    }
+}
+
+impl<F: Format> Rounded<F> {
+    /// An input that the machine holds exactly: any number in `real`.
+    pub fn input(real: Interval) -> Self {
+        Self::made(real, 0.0)
+    }
+
+    fn made(real: Interval, error: f64) -> Self {
+        let size = sum(real.magnitude(), error);
+        // an overflow, or a NaN of infinities: nothing is known
+        let error = if size <= F::LARGEST { error } else { f64::INFINITY };
+        Self { real, error, wraps: false, format: PhantomData }
+    }
+
+    /// The result of an operation that rounds once, after the operands' errors have become `carried`.
+    fn once(real: Interval, carried: f64, least: f64) -> Self {
+        let size = sum(real.magnitude(), carried);
+        Self::made(real, sum(carried, sum(product(F::UNIT, size), least)))
+    }
+
+    /// The result of one of `libm`'s functions.
+    fn by_library(real: Interval, carried: f64, ulps: f64) -> Self {
+        let size = sum(real.magnitude(), carried);
+        Self::made(real, sum(carried, sum(product(2.0 * F::UNIT * ulps, size), 2.0 * F::TINY)))
+    }
+
+    /// The number that this is exactly, in the machine too.
+    fn exact(self) -> Option<f64> {
+        (self.error == 0.0 && self.real.lo == self.real.hi && !self.wraps).then_some(self.real.lo)
+    }
+
+    fn is_power_of_two(self) -> bool {
+        self.exact().is_some_and(|v| v != 0.0 && v.is_normal() && v.to_bits() & ((1 << 52) - 1) == 0)
+    }
+
+    fn inexact(self) -> bool {
+        self.error > 0.0 || self.wraps
+    }
+}
+
+impl<F: Format> Add for Rounded<F> {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        if let (Some(a), Some(b)) = (self.exact(), o.exact()) {
+            return constant(a + b, a, b, self.real + o.real);
+        }
+        if o.exact() == Some(0.0) {
+            return self;
+        }
+        if self.exact() == Some(0.0) {
+            return o;
+        }
+        Self::once(self.real + o.real, sum(self.error, o.error), 0.0)
+    }
+}
+
+/// A sum of constants is exact where its rounding error, by Knuth's two-sum, is zero and the machine can hold it.
+fn constant<F: Format>(sum: f64, a: f64, b: f64, enclosed: Interval) -> Rounded<F> {
+    let back = sum - a;
+    let lost = (a - (sum - back)) + (b - back);
+    if lost == 0.0 && F::from_f64(sum).to_f64() == sum {
+        Rounded::input(Interval::point(sum))
+    } else {
+        Rounded::once(enclosed, 0.0, 0.0)
+    }
+}
+
+impl<F: Format> Sub for Rounded<F> {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        self + -o
+    }
+}
+
+impl<F: Format> Mul for Rounded<F> {
+    type Output = Self;
+    fn mul(self, o: Self) -> Self {
+        for (a, b) in [(self, o), (o, self)] {
+            if a.exact() == Some(1.0) {
+                return b;
+            }
+            if a.exact() == Some(0.0) && b.error.is_finite() {
+                return a;
+            }
+        }
+        let real = self.real * o.real;
+        let carried = sum(
+            sum(product(self.real.magnitude(), o.error), product(o.real.magnitude(), self.error)),
+            product(self.error, o.error),
+        );
+        if self.is_power_of_two() || o.is_power_of_two() {
+            // rounds only where it underflows
+            return Self::made(real, sum(carried, F::TINY));
+        }
+        Self::once(real, carried, F::TINY)
+    }
+}
+
+impl<F: Format> Div for Rounded<F> {
+    type Output = Self;
+    fn div(self, o: Self) -> Self {
+        if o.exact() == Some(1.0) {
+            return self;
+        }
+        let real = self.real / o.real;
+        // x̃/ỹ − x/y = ((x̃ − x) − (x/y)(ỹ − y))/ỹ
+        let least = (o.real.mignitude() - o.error).next_down();
+        let carried = quotient(sum(self.error, product(real.magnitude(), o.error)), least);
+        if least <= 0.0 {
+            return Self::made(real, f64::INFINITY);
+        }
+        if o.is_power_of_two() {
+            return Self::made(real, sum(carried, F::TINY));
+        }
+        Self::once(real, carried, F::TINY)
+    }
+}
+
+impl<F: Format> Neg for Rounded<F> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { real: -self.real, ..self }
+    }
+}
+
+impl<F: Format> Real for Rounded<F> {
+    fn ratio(numerator: i32, denominator: i32) -> Self {
+        let (n, d) = (f64::from(numerator), f64::from(denominator));
+        let (nearest, machine) = (n / d, F::ratio(numerator, denominator).to_f64());
+        if nearest * d == n && machine == nearest && (machine * d).to_bits() == n.to_bits() && d.log2().fract() == 0.0 {
+            return Self::input(Interval::point(machine));
+        }
+        // numerator, denominator and quotient are rounded
+        let real = Interval::point(n) / Interval::point(d);
+        Self::made(real, product(3.1 * F::UNIT, real.magnitude()))
+    }
+
+    fn sqrt(self) -> Self {
+        let lowest = (self.real.lo - self.error).next_down();
+        if self.real.lo < 0.0 || (self.inexact() && lowest < 0.0) {
+            return Self::made(self.real.sqrt(), f64::INFINITY);
+        }
+        let below = (self.real.lo.sqrt().next_down() + lowest.max(0.0).sqrt().next_down()).next_down();
+        let carried = quotient(self.error, below).min(self.error.sqrt().next_up());
+        let carried = if self.error == 0.0 { 0.0 } else { carried };
+        Self::once(self.real.sqrt(), carried, 0.0)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        let (sin, cos) = self.real.sin_cos();
+        // neither moves faster than the angle; a whole turn changes nothing
+        if self.exact() == Some(0.0) {
+            return (Self::input(Interval::point(0.0)), Self::input(Interval::point(1.0)));
+        }
+        (Self::by_library(sin, self.error, F::SIN_COS_ULPS), Self::by_library(cos, self.error, F::SIN_COS_ULPS))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        let (y, (real, cut)) = (self, self.real.atan2(x.real));
+        let distance = (x.real.squared() + y.real.squared()).sqrt().lo;
+        let reach = (Interval::point(x.error).squared() + Interval::point(y.error).squared()).sqrt().hi;
+        let reach = if x.error == 0.0 && y.error == 0.0 { 0.0 } else { reach };
+        let moved = (distance - reach).next_down();
+        if moved <= 0.0 {
+            return Self::made(real, f64::INFINITY);
+        }
+        // the sine of the angle between the two points is their cross product over both distances
+        let cross = sum(product(x.real.magnitude(), y.error), product(y.real.magnitude(), x.error));
+        let sine = quotient(cross, (distance * moved).next_down());
+        if sine >= 0.5 {
+            return Self::made(real, f64::INFINITY);
+        }
+        // asin t ≤ t/√(1 − t²)
+        let carried = quotient(sine, (1.0 - sine * sine).next_down().sqrt().next_down());
+        // close to 180° the two may lie on either side of the cut
+        let near = x.real.lo <= x.error && y.real.lo <= y.error && y.real.hi >= -y.error && y.inexact();
+        Self { wraps: cut || near, ..Self::by_library(real, carried, F::ATAN2_ULPS) }
+    }
+}
+
+/// The path through comparisons of this thread's evaluation.
+#[derive(Default)]
+struct Path {
+    script: Vec<Ordering>,
+    taken: Vec<Ordering>,
+    undecided: bool,
+}
+
+thread_local! {
+    static PATH: RefCell<Path> = RefCell::new(Path::default());
+}
+
+/// Runs `evaluate` once for each outcome of the comparisons that its box leaves open. `None` where rounding leaves a
+/// comparison open, so that machine and real numbers might part there.
+pub(crate) fn on_every_path<R>(mut evaluate: impl FnMut() -> R) -> Option<Vec<R>> {
+    let mut scripts = vec![Vec::new()];
+    let mut found = Vec::new();
+    while let Some(script) = scripts.pop() {
+        let given = script.len();
+        PATH.with(|path| *path.borrow_mut() = Path { script, ..Path::default() });
+        found.push(evaluate());
+        let path = PATH.with(|path| std::mem::take(&mut *path.borrow_mut()));
+        if path.undecided {
+            return None;
+        }
+        for turn in given..path.taken.len() {
+            for other in [Ordering::Equal, Ordering::Greater] {
+                scripts.push(path.taken[..turn].iter().copied().chain([other]).collect());
+            }
+        }
+    }
+    Some(found)
+}
+
+impl<F: Format> PartialEq for Rounded<F> {
+    fn eq(&self, other: &Self) -> bool {
+        self.partial_cmp(other) == Some(Ordering::Equal)
+    }
+}
+
+impl<F: Format> PartialOrd for Rounded<F> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let lower = |v: &Self| (v.real.lo - v.error).next_down();
+        let upper = |v: &Self| (v.real.hi + v.error).next_up();
+        if upper(self) < lower(other) {
+            return Some(Ordering::Less);
+        }
+        if lower(self) > upper(other) {
+            return Some(Ordering::Greater);
+        }
+        if let (Some(a), Some(b)) = (self.exact(), other.exact()) {
+            return a.partial_cmp(&b);
+        }
+        Some(PATH.with(|path| {
+            let mut path = path.borrow_mut();
+            path.undecided |= self.inexact() || other.inexact();
+            let order = path.script.get(path.taken.len()).copied().unwrap_or(Ordering::Less);
+            path.taken.push(order);
+            order
+        }))
+    }
+}

@@ -1,0 +1,57 @@
+//! How proofs and their twins are run: one claim, once as it is and once with an error planted in it.
+
+use cvg_model::Real;
+use cvg_prover::{Exact, Failure, Format, Formula, Interval, Proof, Refusal, bound_rounding, prove, refuted};
+
+use crate::{Scalar, Tolerance};
+
+/// A planted factor, as a quotient of integers; 1 plants nothing.
+pub type Planted = (i32, i32);
+
+/// Factors that make an equality false: 1 % too large, 1 % too small, the wrong sign.
+pub const WRONG: &[Planted] = &[(101, 100), (99, 100), (-1, 1)];
+/// Factors that make an upper bound too tight.
+pub const TOO_TIGHT: &[Planted] = &[(99, 100), (-1, 1)];
+
+/// The claim with nothing planted is proved, on some path that is not empty.
+#[track_caller]
+pub fn holds(claim: impl Fn(&mut Proof, Exact) -> Result<(), Refusal>) {
+    match prove(|proof| claim(proof, Exact::one())) {
+        Ok(proved) => println!("{proved:?}"),
+        Err(refusal) => panic!("{refusal}"),
+    }
+}
+
+/// The claim is refuted, with a point at which it fails, for each of the planted factors.
+#[track_caller]
+pub fn rejects(planted: &[Planted], claim: impl Fn(&mut Proof, Exact) -> Result<(), Refusal>) {
+    for &(numerator, denominator) in planted {
+        println!("{}", refuted(prove(|proof| claim(proof, Exact::ratio(numerator, denominator)))));
+    }
+}
+
+/// A box of inputs.
+pub type Inputs = Vec<Interval>;
+
+/// For all inputs in the boxes the scalar's result is within its tolerance of the real value.
+#[track_caller]
+pub fn bounded<T: Scalar + Format>(formula: &impl Formula, boxes: &[Inputs], tolerance: &Tolerance) {
+    match bound_rounding::<T>(formula, boxes, T::tolerance(tolerance), 1.0) {
+        Ok(bounded) => println!("{}: {bounded:?}", tolerance.of),
+        Err(failure) => panic!("{}: {failure}", tolerance.of),
+    }
+}
+
+/// The same bound is refuted, with inputs at which the machine breaks it, where the result is 1 % off or has the wrong
+/// sign, and in single precision also where the tolerance is a five-hundredth.
+#[track_caller]
+pub fn rejects_rounding<T: Scalar + Format>(formula: &impl Formula, boxes: &[Inputs], tolerance: &Tolerance) {
+    let allowed = T::tolerance(tolerance);
+    let tight = if T::UNIT > 1e-10 { Some((allowed / 500.0, 1.0)) } else { None };
+    for (allowed, factor) in [(allowed, 1.01), (allowed, -1.0)].into_iter().chain(tight) {
+        match bound_rounding::<T>(formula, boxes, allowed, factor) {
+            Err(Failure::Refuted { at, error, .. }) => println!("{error:e} at {at:?} refutes {allowed:e}"),
+            other => panic!("a planted error was not refuted: {other:?}"),
+        }
+    }
+}

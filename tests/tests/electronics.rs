@@ -1,0 +1,204 @@
+//! What runs once per sample beside Equation 3: total, bounded, and itself again after anything.
+
+use core::f64::consts::PI;
+
+use cvg_controller::{Allocation, Heading, OrbitCommands, PiState, RateLoop};
+use cvg_estimator::direction::major_axis;
+use cvg_estimator::{AngleState, LockState, PatternAngle, Period, PhaseLock, Status};
+use cvg_model::{Envelope, Pendulum, Real};
+use cvg_prover::{Exact, Proof, Refusal};
+use cvg_tests::domain::{envelope_patterns, envelopes, orbits, patterns, wrapped};
+use cvg_tests::proof::{WRONG, holds, rejects};
+use cvg_tests::scalar::rounded_envelope;
+use cvg_tests::tolerances::{ANGLE, DIRECTION};
+use cvg_tests::{Scalar, for_each_scalar, prop_assert_near};
+use proptest::prelude::*;
+
+const LIMIT: f64 = 5.0;
+
+/// Half of a period in the scalar.
+fn half_period<T: Scalar>(period: Period) -> f64 {
+    let half = if matches!(period, Period::Pattern) { T::half() } else { T::one() };
+    (T::PI * half).to_f64()
+}
+
+fn lock<T: Scalar>() -> PhaseLock<T> {
+    let [bandwidth, damping, period, limit] = [20.0, 0.7, 1e-3, LIMIT].map(T::from_f64);
+    PhaseLock::new(bandwidth, damping, period, limit).expect("inside its domain")
+}
+
+for_each_scalar! {
+    //= specs/electronics.md#reading-within-its-period
+    //= type=test
+    //# The reading of the pattern angle MUST be finite and within half its period of zero for every input and every state.
+    #[test]
+    fn prop_a_reading_of_any_bits_lies_within_its_period(
+        e in envelope_patterns::<T>(), within in patterns::<T>(), periods: i64, full_turn: bool,
+    ) {
+        let period = if full_turn { Period::FullTurn } else { Period::Pattern };
+        let tracker = PatternAngle::<T>::new(period, T::from_f64(0.0)).expect("a least amplitude of 0");
+        let reading = tracker.step(&mut AngleState { periods, within_rad: within }, &e);
+        prop_assert!(reading.within_rad.to_f64().abs() <= half_period::<T>(period), "{reading:?}");
+    }
+
+    //= specs/electronics.md#reading-is-held
+    //= type=test
+    //# An envelope without a direction MUST leave the reading as it was and say so.
+    #[test]
+    fn prop_a_reading_is_held_where_there_is_no_direction(o in orbits(), size in 0.0..2.0_f64, broken: bool) {
+        let tracker = PatternAngle::<T>::new(Period::Pattern, T::from_f64(0.0)).expect("a least amplitude of 0");
+        let mut state = AngleState::default();
+        let before = tracker.step(&mut state, &rounded_envelope::<T>(&o.envelope()).0);
+        let (size, none) = (T::from_f64(size), T::from_f64(0.0));
+        let nowhere = if broken {
+            Envelope::new(T::from_f64(f64::NAN), size, size, size)
+        } else {
+            Envelope::new(size, none, none, size)
+        };
+        let held = tracker.step(&mut state, &nowhere);
+        prop_assert_eq!((held.periods, held.within_rad), (before.periods, before.within_rad));
+        prop_assert_eq!(held.status, if broken { Status::Invalid } else { Status::Undetermined });
+    }
+
+    //= specs/electronics.md#reading-recovers
+    //= type=test
+    //# The first envelope with a direction MUST give the angle of that envelope whatever was read before.
+    #[test]
+    fn prop_a_reading_recovers_from_any_bits(
+        e in envelope_patterns::<T>(), within in patterns::<T>(), periods: i64, o in orbits(),
+    ) {
+        let tracker = PatternAngle::<T>::new(Period::Pattern, T::from_f64(0.0)).expect("a least amplitude of 0");
+        let mut state = AngleState { periods, within_rad: within };
+        tracker.step(&mut state, &e);
+        let line = rounded_envelope::<T>(&o.envelope()).0;
+        let reading = tracker.step(&mut state, &line);
+        prop_assert_eq!(reading.status, Status::Valid);
+        prop_assert_eq!(reading.within_rad, line.pendulum().angle());
+    }
+
+    //= specs/electronics.md#direction-is-bounded
+    //= type=test
+    //# The components of the direction of the major axis MUST be finite and below two in magnitude for every input.
+    #[test]
+    fn prop_a_direction_of_any_bits_is_bounded(e in envelope_patterns::<T>()) {
+        let d = major_axis(&e, &e.pendulum());
+        prop_assert!(d.cos.to_f64().abs() < 2.0 && d.sin.to_f64().abs() < 2.0, "{d:?}");
+    }
+
+    //= specs/electronics.md#direction-is-a-unit-vector
+    //= type=test
+    //# The direction of the major axis MUST have the length one up to rounding.
+    #[test]
+    fn prop_a_direction_has_length_one(e in envelopes()) {
+        let (e, _) = rounded_envelope::<T>(&e);
+        let d = major_axis(&e, &e.pendulum());
+        prop_assert_near!(d.cos.to_f64().hypot(d.sin.to_f64()), 1.0, T::tolerance(&DIRECTION));
+    }
+
+    //= specs/electronics.md#direction-of-equation-4
+    //= type=test
+    //# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
+    #[test]
+    fn prop_the_direction_is_equation_4_up_to_half_a_turn(o in orbits()) {
+        let (e, _) = rounded_envelope::<T>(&o.envelope());
+        let p = e.pendulum();
+        let d = major_axis(&e, &p);
+        prop_assert_eq!(d.status, Status::Valid);
+        let off = wrapped(d.angle().to_f64() - p.angle().to_f64(), PI);
+        let condition = p.e.to_f64() / p.r.to_f64().hypot(p.s.to_f64());
+        prop_assert_near!(off, 0.0, 2.0 * T::tolerance(&ANGLE) * condition);
+    }
+
+    //= specs/electronics.md#correction-within-its-limit
+    //= type=test
+    //# The frequency correction MUST be finite and within its limit for every input and every state.
+    #[test]
+    fn prop_a_correction_of_any_bits_is_within_its_limit(
+        e in patterns::<T>(), l in patterns::<T>(), detuning in patterns::<T>(),
+    ) {
+        let zero = T::from_f64(0.0);
+        let mut state = LockState { detuning_rad_s: detuning };
+        let correction = lock::<T>().step(&mut state, &Pendulum { e, q: zero, r: zero, s: zero, l });
+        prop_assert!(correction.rad_s.to_f64().abs() <= LIMIT, "{correction:?}");
+        prop_assert!(state.detuning_rad_s.to_f64().abs() <= LIMIT, "{state:?}");
+    }
+
+    //= specs/electronics.md#correction-is-held
+    //= type=test
+    //# Pendulum variables that hold no phase MUST leave the integral part of the correction as it was.
+    #[test]
+    fn prop_a_correction_is_held_where_there_is_no_phase(detuning in -LIMIT..LIMIT, broken in 0..3_i32) {
+        let (zero, nan) = (T::from_f64(0.0), T::from_f64(f64::NAN));
+        let (e, l) = [(zero, zero), (nan, zero), (T::from_f64(1.0), nan)][usize::try_from(broken).unwrap_or(0)];
+        let mut state = LockState { detuning_rad_s: T::from_f64(detuning) };
+        let correction = lock::<T>().step(&mut state, &Pendulum { e, q: zero, r: zero, s: zero, l });
+        prop_assert_eq!(state.detuning_rad_s, T::from_f64(detuning));
+        prop_assert_eq!(correction.rad_s, T::from_f64(detuning));
+        prop_assert_ne!(correction.status, Status::Valid);
+    }
+
+    //= specs/electronics.md#drives-within-their-limit
+    //= type=test
+    //# Each drive MUST get a finite voltage within its limit for every command and every direction.
+    #[test]
+    fn prop_drives_of_any_bits_are_within_their_limit(
+        v in proptest::array::uniform4(patterns::<T>()), cos in patterns::<T>(), sin in patterns::<T>(),
+    ) {
+        let allocation = Allocation::new(None, T::from_f64(LIMIT)).expect("a limit");
+        let [v_as, v_qs, v_qc, v_ac] = v;
+        let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin).volts;
+        for volts in [drive.x_c, drive.x_s, drive.y_c, drive.y_s] {
+            prop_assert!(volts.to_f64().abs() <= LIMIT, "{drive:?}");
+        }
+    }
+
+    //= specs/electronics.md#heading-within-its-limit
+    //= type=test
+    //# The output that holds the pattern MUST be finite and within its limit for every input and every state.
+    #[test]
+    fn prop_the_output_that_holds_the_pattern_is_within_its_limit_for_any_bits(
+        v in proptest::array::uniform4(patterns::<T>()),
+    ) {
+        let [bandwidth, damping, drive, largest, period, limit] = [12.0, 1.0, 1.0, 10.0, 5e-4, LIMIT].map(T::from_f64);
+        let rate = RateLoop::tuned(bandwidth, damping, drive, largest, period, limit).expect("inside its domain");
+        let heading = Heading::new(T::from_f64(0.3)).expect("finite");
+        let [e, r, s, integral] = v;
+        let mut state = PiState { integral };
+        let volts = rate.step(&mut state, &Pendulum { e, q: e, r, s, l: e }, &heading).volts;
+        prop_assert!(volts.to_f64().abs() <= LIMIT && state.integral.is_finite(), "{volts:?} {state:?}");
+    }
+}
+
+/// Any envelope but a circle, on which the direction is found.
+fn direction(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
+    let [x_c, x_s, y_c, y_s] = ["x_c", "x_s", "y_c", "y_s"].map(Exact::real);
+    let e = Envelope::new(x_c, x_s, y_c, y_s);
+    let p = e.pendulum();
+    let eccentricity = p.r.squared() + p.s.squared();
+    proof.assume_positive(eccentricity);
+    let d = major_axis(&e, &p);
+    if d.status != Status::Valid {
+        return Ok(());
+    }
+    proof.equal("length", d.cos * d.cos + d.sin * d.sin, planted * planted * planted)?;
+    // twice the direction is that of (R, S): no cross product
+    let (cos_2, sin_2) = (d.cos * d.cos - d.sin * d.sin, Exact::two() * d.sin * d.cos);
+    proof.equal("R", cos_2 * p.r.norm(p.s), planted * p.r)?;
+    proof.equal("S", sin_2 * p.r.norm(p.s), planted * p.s)
+}
+
+//= specs/electronics.md#direction-is-a-unit-vector
+//= type=test
+//# The direction of the major axis MUST have the length one up to rounding.
+//= specs/electronics.md#direction-of-equation-4
+//= type=test
+//# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
+#[test]
+fn identity_the_direction_is_equation_4() {
+    holds(direction);
+}
+
+#[test]
+fn identity_the_direction_is_equation_4_twin() {
+    rejects(WRONG, direction);
+}
