@@ -13,6 +13,8 @@
 
 pub mod allocation;
 pub mod pi;
+#[cfg(any(kani, test, cvg_prove))]
+pub mod proofs;
 pub mod rate;
 
 pub use allocation::{ActuationCompensation, Allocation, OrbitCommands};

@@ -1,0 +1,54 @@
+//! The PI of both controllers of Equation 3.
+
+use cvg_model::Float;
+use kani::Arbitrary;
+
+use crate::{Command, Pi, PiState, Status};
+
+/// Any controller that can be built, and its limit.
+pub(super) fn any_controller<T: Float + Arbitrary>() -> (Pi<T>, T) {
+    let limit_v = kani::any();
+    // precondition: a configuration that `new` accepts
+    match Pi::new(kani::any(), kani::any(), kani::any(), limit_v) {
+        Ok(pi) => (pi, limit_v),
+        Err(_) => {
+            kani::assume(false);
+            unreachable!()
+        }
+    }
+}
+
+/// One step of the energy, the quadrature or the plain controller, on any input.
+fn any_step<T: Float + Arbitrary>(pi: &Pi<T>, state: &mut PiState<T>) -> Command<T> {
+    match kani::any::<u8>() {
+        0 => pi.energy(state, kani::any(), kani::any()),
+        1 => pi.quadrature(state, kani::any()),
+        _ => pi.control(state, kani::any()),
+    }
+}
+
+fn output_is_bounded<T: Float + Arbitrary>(share: T) {
+    let (pi, limit_v) = any_controller::<T>();
+    let mut state = PiState { integral: kani::any() };
+    let command = any_step(&pi, &mut state);
+    kani::cover!(command.status == Status::Within, "the output is as asked");
+    kani::cover!(command.status == Status::Limited, "the output is limited");
+    kani::cover!(command.status == Status::Invalid, "the input is no number");
+    assert!(command.volts >= -(share * limit_v) && command.volts <= share * limit_v);
+    assert!(state.integral.is_finite());
+}
+
+//= specs/equation-03.md#bounded-output
+//# The output MUST be finite and within its limit for every input.
+/// The output of every controller lies within its limit and the integral is finite, for any bits of input and state.
+#[kani::proof]
+pub fn proof_pi_output_is_bounded_f32() {
+    output_is_bounded(1.0_f32);
+}
+
+/// Half the limit is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_pi_output_is_bounded_f32() {
+    output_is_bounded(0.5_f32);
+}

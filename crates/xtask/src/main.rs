@@ -1,0 +1,44 @@
+//! What the repository can do for itself.
+//!
+//! ```sh
+//! cargo xtask prove [--only TEXT]   # the bit-precise harnesses, by CBMC on the compiled code
+//! cargo xtask audit                 # every equation, every requirement, and what this run says of it
+//! ```
+#![forbid(unsafe_code)]
+
+mod audit;
+mod prove;
+mod source;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs]";
+
+/// What a task returns: whether everything held, or why it could not be found out.
+type Outcome = Result<bool, String>;
+
+/// The root of the repository.
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(Path::to_owned).unwrap_or_default()
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match arguments[..] {
+        ["prove"] => prove::run(None),
+        ["prove", "--only", text] => prove::run(Some(text)),
+        ["audit"] => audit::run(false),
+        ["audit", "--keep-proofs"] => audit::run(true),
+        _ => Err(USAGE.to_owned()),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(reason) => {
+            eprintln!("not run: {reason}");
+            ExitCode::from(2)
+        }
+    }
+}

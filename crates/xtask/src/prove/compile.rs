@@ -1,0 +1,157 @@
+//! Harnesses → one wasm module → C.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use super::Harness;
+use super::root::Root;
+
+/// The crates that have harnesses; the guards are files of this one.
+pub(crate) const CRATES: [&str; 3] = ["model", "estimator", "controller"];
+
+/// The folder in which the C is, ready for CBMC.
+pub(crate) fn compile(repository: &Path, root: &Root, harnesses: &[Harness]) -> Result<PathBuf, String> {
+    let work = repository.join("target/prove");
+    let io = |e: std::io::Error| e.to_string();
+    let shim = work.join("shim");
+    let crate_folder = work.join("harness");
+    let c = work.join("c");
+    for folder in [&shim, &crate_folder.join("src"), &c] {
+        fs::create_dir_all(folder).map_err(io)?;
+    }
+
+    // the stand-in for Kani is handed to every crate, without being a dependency of any
+    let sources = repository.join("crates/kani-shim");
+    let rustc = || {
+        let mut command = Command::new(root.tool("rustc"));
+        command.args(["--edition=2024", "--out-dir"]).arg(&shim);
+        command
+    };
+    run(rustc()
+        .args(["--crate-name=cvg_kani_macros", "--crate-type=proc-macro", "--extern=proc_macro"])
+        .arg(sources.join("macros/src/lib.rs")))?;
+    run(rustc()
+        .args(["--crate-name=kani", "--crate-type=rlib", "--target=wasm32-unknown-unknown", "-Copt-level=3"])
+        .arg(format!("--extern=cvg_kani_macros={}", shim.join("libcvg_kani_macros.so").display()))
+        .arg(sources.join("src/lib.rs")))?;
+
+    write_crate(repository, &crate_folder, harnesses)?;
+    let linker = root.tool("wasm-ld");
+    let flags = [
+        "--cfg=cvg_prove".to_owned(),
+        format!("--extern=kani={}", shim.join("libkani.rlib").display()),
+        format!("-Ldependency={}", shim.display()),
+        format!("-Clinker={}", linker.display()),
+        "-Clink-arg=-zstack-size=4096".to_owned(),
+        // bulk copies and saturating conversions as plain code
+        "-Ctarget-cpu=mvp".to_owned(),
+    ];
+    let target = work.join("wasm");
+    run(Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["build", "--release", "--target=wasm32-unknown-unknown", "--manifest-path"])
+        .arg(crate_folder.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(&target)
+        .env("RUSTC", root.tool("rustc"))
+        .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
+        .env_remove("RUSTC_WRAPPER")
+        .env_remove("CARGO_TARGET_DIR"))?;
+    run(Command::new(root.tool("wasm2c"))
+        .args(["-n", "harness", "-o"])
+        .arg(c.join("harness.c"))
+        .arg(target.join("wasm32-unknown-unknown/release/harness.wasm")))?;
+    let module = fs::read_to_string(c.join("harness.c")).map_err(io)?;
+    fs::write(c.join("data.c"), data(&module)?).map_err(io)?;
+    fs::write(c.join("host.c"), include_str!("host.c")).map_err(io)?;
+    Ok(c)
+}
+
+/// The crate that exports every harness by its name.
+fn write_crate(repository: &Path, folder: &Path, harnesses: &[Harness]) -> Result<(), String> {
+    let io = |e: std::io::Error| e.to_string();
+    let mut manifest = "[package]\nname = \"harness\"\nversion = \"0.0.0\"\nedition = \"2024\"\n\n[lib]\n\
+        crate-type = [\"cdylib\"]\n\n[profile.release]\npanic = \"abort\"\nopt-level = 3\nlto = \"fat\"\n\
+        codegen-units = 1\noverflow-checks = true\n\n[workspace]\n\n[dependencies]\n"
+        .to_owned();
+    for name in CRATES {
+        let path = repository.join("crates").join(name);
+        let _ = writeln!(manifest, "cvg-{name} = {{ path = {:?} }}", path.display().to_string());
+    }
+    let guards = repository.join("crates/xtask/src/prove/guards.rs");
+    let mut source = format!(
+        "#![no_std]\n#[panic_handler]\nfn panic(_: &core::panic::PanicInfo) -> ! {{ core::arch::wasm32::unreachable() }}\n\
+         #[path = {:?}]\nmod guards;\n",
+        guards.display().to_string()
+    );
+    for h in harnesses {
+        let _ = writeln!(
+            source,
+            "#[unsafe(export_name = {name:?})]\npub extern \"C\" fn export_{name}() {{ {path}() }}",
+            name = h.function.name,
+            path = h.path
+        );
+    }
+    fs::write(folder.join("Cargo.toml"), manifest).map_err(io)?;
+    fs::write(folder.join("src/lib.rs"), source).map_err(io)?;
+    // the same versions as in the workspace
+    fs::copy(repository.join("Cargo.lock"), folder.join("Cargo.lock")).map_err(io)?;
+    Ok(())
+}
+
+/// The memory with the data segments that `module`, wasm2c's output, loads when it starts.
+fn data(module: &str) -> Result<String, String> {
+    let mut initial = String::new();
+    // the body of wasm2c's memory_init, the instruction for bulk data, which the target does not have
+    let bulk = "(*dest), dest_addr, src + src_addr, n);";
+    let loads = module.lines().filter_map(|line| line.trim().strip_prefix("LOAD_DATA(")).filter(|load| *load != bulk);
+    for load in loads {
+        let parts: Vec<_> = load.trim_end_matches(");").split(", ").collect();
+        let [_, offset, segment, length] = parts[..] else {
+            return Err(format!("wasm2c loads data in a way that is not known: {load}"));
+        };
+        let bytes = module
+            .split_once(&format!("{segment}[] = {{"))
+            .and_then(|(_, rest)| rest.split_once("};"))
+            .map(|(bytes, _)| bytes.trim().trim_end_matches(','))
+            .ok_or_else(|| format!("wasm2c's data segment {segment} was not found"))?;
+        let count = bytes.split(',').count();
+        if length.parse() != Ok(count) {
+            return Err(format!("data segment {segment}: {count} bytes, {length} are loaded"));
+        }
+        let _ = writeln!(initial, "[{offset}] = {bytes},");
+    }
+    Ok(format!("static uint8_t memory[MEMORY] = {{{initial}}};\n"))
+}
+
+fn run(command: &mut Command) -> Result<(), String> {
+    let shown = format!("{:?}", command.get_program());
+    let output = command.output().map_err(|e| format!("{shown}: {e}"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let said = [output.stdout, output.stderr].concat();
+    Err(format!("{shown}: {}\n{}", output.status, String::from_utf8_lossy(&said)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::data;
+
+    const MODULE: &str = "static const u8 segment_a[] = {\n  0x01, 0x02, \n  0x03, \n};\n\
+        static void init() {\n  LOAD_DATA(instance->w2c_memory, 4096u, segment_a, 3);\n}\n";
+
+    #[test]
+    fn data_segments_are_where_they_are_loaded() {
+        let text = data(MODULE).expect("a segment");
+        assert!(text.contains("[4096u] = 0x01, 0x02, \n  0x03"), "{text}");
+    }
+
+    #[test]
+    fn a_segment_that_is_not_there_or_not_whole_is_an_error() {
+        data(&MODULE.replace("segment_a[]", "segment_b[]")).expect_err("not there");
+        data(&MODULE.replace("0x02, ", "")).expect_err("not whole");
+        data(&MODULE.replace("LOAD_DATA(instance->w2c_memory, ", "LOAD_DATA(")).expect_err("not known");
+    }
+}

@@ -1,0 +1,162 @@
+//! What makes a proof of compiled code lie, each with a claim that shows that it does not here, and the claim's twin.
+//!
+//! They are proved with the others, by the same commands, before anything is believed.
+
+#![allow(missing_docs, reason = "the names are the claims")]
+
+use core::hint::black_box;
+
+/// Values that have to come from the module's data segment.
+static SQUARES: [u32; 8] = [0, 1, 4, 9, 16, 25, 36, 49];
+
+fn constants_are_loaded(claimed: impl Fn(usize) -> u32) {
+    let i: usize = kani::any_where(|i| *i < SQUARES.len());
+    kani::cover!(i == 7, "the last constant");
+    assert!(black_box(&SQUARES)[i] == claimed(i));
+}
+
+/// Constants are what the source says, not zero.
+#[kani::proof]
+pub fn proof_guard_constants_are_loaded() {
+    constants_are_loaded(|i| (i * i) as u32);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_constants_are_loaded() {
+    constants_are_loaded(|_| 0);
+}
+
+fn floats_keep_their_bits_in_memory(flipped: u32) {
+    let i: usize = kani::any_where(|i| *i < 4);
+    let bits: u32 = kani::any();
+    let other: f32 = kani::any();
+    let mut words = [other; 4];
+    black_box(&mut words)[i] = f32::from_bits(bits);
+    kani::cover!(f32::from_bits(bits).is_nan(), "not a number");
+    kani::cover!(bits == 1, "the smallest number");
+    assert!(words[i].to_bits() == bits ^ flipped);
+    let narrow = black_box(&words)[i].to_bits().to_le_bytes();
+    assert!(u32::from_le_bytes(narrow) == bits);
+    let double: f64 = kani::any();
+    assert!(f64::from_bits(*black_box(&double.to_bits())).to_bits() == double.to_bits());
+}
+
+/// A float that is stored, loaded and taken apart has the bits it had, whichever they are.
+#[kani::proof]
+pub fn proof_guard_floats_keep_their_bits_in_memory() {
+    floats_keep_their_bits_in_memory(0);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_floats_keep_their_bits_in_memory() {
+    floats_keep_their_bits_in_memory(1);
+}
+
+fn copies_are_whole(last: usize) {
+    let mut from = [0_u64; 16];
+    let value = kani::any();
+    from[15] = value;
+    kani::cover!(value == 3, "a value");
+    let to = *black_box(&from);
+    assert!(black_box(&to)[last] == value);
+}
+
+/// A large copy is whole.
+#[kani::proof]
+#[kani::unwind(200)]
+pub fn proof_guard_copies_are_whole() {
+    copies_are_whole(15);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+#[kani::unwind(200)]
+pub fn twin_guard_copies_are_whole() {
+    copies_are_whole(14);
+}
+
+fn panics_are_seen(most: u32) {
+    let i: u32 = kani::any_where(|i| *i < 9);
+    kani::cover!(i == 8, "the largest");
+    // out of bounds for 8, if it can be 8
+    let i = if i > most { most } else { i };
+    assert!(black_box(&SQUARES)[i as usize] < 50);
+}
+
+/// An index beyond the end panics, and a panic is seen.
+#[kani::proof]
+pub fn proof_guard_panics_are_seen() {
+    panics_are_seen(7);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_panics_are_seen() {
+    panics_are_seen(8);
+}
+
+fn overflow_is_seen(most: u32) {
+    let a: u32 = kani::any_where(|a| *a <= most);
+    kani::cover!(a == most, "the largest");
+    let _ = black_box(black_box(a) + 1);
+}
+
+/// An overflow panics as in a debug build.
+#[kani::proof]
+pub fn proof_guard_overflow_is_seen() {
+    overflow_is_seen(u32::MAX - 1);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_overflow_is_seen() {
+    overflow_is_seen(u32::MAX);
+}
+
+fn arithmetic_is_ieee(half_ulp: f32) {
+    // 2^24 + 1 is a tie: it goes to the even neighbour
+    let x: f32 = kani::any_where(|x| *x == 16_777_216.0);
+    kani::cover!(x > 0.0, "a number");
+    assert!(x + 1.0 == x && x + (1.0 + half_ulp) == x + 2.0);
+    let tiny: f32 = kani::any_where(|x: &f32| x.to_bits() == 1);
+    assert!(tiny > 0.0 && tiny / 2.0 == 0.0 && tiny * 2.0 != tiny);
+}
+
+/// Arithmetic rounds to nearest, ties to even, and keeps subnormal numbers.
+#[kani::proof]
+pub fn proof_guard_arithmetic_is_ieee() {
+    arithmetic_is_ieee(f32::EPSILON);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_arithmetic_is_ieee() {
+    arithmetic_is_ieee(0.0);
+}
+
+fn loops_are_counted() {
+    let n: u32 = kani::any_where(|n| *n <= 8);
+    kani::cover!(n == 8, "all rounds");
+    let mut i = 0;
+    while i < n {
+        i += black_box(1);
+    }
+    assert!(i == n);
+}
+
+/// A loop that is unwound far enough is proved.
+#[kani::proof]
+#[kani::unwind(10)]
+pub fn proof_guard_loops_are_counted() {
+    loops_are_counted();
+}
+
+/// The same loop cut short: what is refuted is not the claim but that all rounds were looked at.
+#[kani::proof]
+#[kani::should_panic]
+#[kani::unwind(5)]
+pub fn twin_guard_loops_are_counted() {
+    loops_are_counted();
+}

@@ -1,0 +1,202 @@
+//! What the sources name: functions with their citations of requirements, their attributes and their covers.
+//!
+//! It reads lines, not syntax: rustfmt puts a function's closing brace at the indentation of its first line.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A requirement as a function cites it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Citation {
+    /// `specs/equation-03.md#signs`
+    pub(crate) target: String,
+    /// the sentence
+    pub(crate) quote: String,
+}
+
+/// A function as it stands in a file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Function {
+    /// relative to the repository
+    #[allow(dead_code)]
+    pub(crate) file: PathBuf,
+    pub(crate) line: usize,
+    pub(crate) name: String,
+    pub(crate) doc: String,
+    pub(crate) citations: Vec<Citation>,
+    /// `kani::unwind(3)`
+    pub(crate) attributes: Vec<String>,
+    pub(crate) body: String,
+}
+
+impl Function {
+    /// The argument of the attribute `name`.
+    pub(crate) fn argument(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find_map(|a| a.strip_prefix(name)?.strip_prefix('(')?.strip_suffix(')'))
+    }
+
+    pub(crate) fn has(&self, attribute: &str) -> bool {
+        self.attributes.iter().any(|a| a == attribute)
+    }
+}
+
+/// The name of the function that `line` begins.
+fn function_name(line: &str) -> Option<&str> {
+    let mut rest = line.trim_start();
+    if let Some(after) = rest.strip_prefix("pub") {
+        rest = after.strip_prefix('(').map_or(after, |scope| scope.split_once(')').map_or(after, |(_, r)| r));
+        rest = rest.trim_start();
+    }
+    rest = rest.strip_prefix("const ").unwrap_or(rest);
+    let name = rest.strip_prefix("fn ")?;
+    let end = name.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))?;
+    (end > 0).then(|| &name[..end])
+}
+
+fn indentation(line: &str) -> usize {
+    line.len() - line.trim_start().len()
+}
+
+/// The functions of a source text.
+pub(crate) fn functions(file: &Path, text: &str) -> Vec<Function> {
+    let lines: Vec<&str> = text.lines().collect();
+    let mut found = Vec::new();
+    let mut pending = Function::default();
+    for (i, line) in lines.iter().enumerate() {
+        let trimmed = line.trim();
+        if let Some(target) = trimmed.strip_prefix("//= ") {
+            if target.starts_with("specs/") {
+                pending.citations.push(Citation { target: target.to_owned(), quote: String::new() });
+            }
+        } else if let Some(quote) = trimmed.strip_prefix("//# ") {
+            if let Some(last) = pending.citations.last_mut() {
+                let space = if last.quote.is_empty() { "" } else { " " };
+                last.quote += &format!("{space}{quote}");
+            }
+        } else if let Some(doc) = trimmed.strip_prefix("///") {
+            let space = if pending.doc.is_empty() { "" } else { " " };
+            pending.doc += &format!("{space}{}", doc.trim());
+        } else if let Some(attribute) = trimmed.strip_prefix("#[") {
+            pending.attributes.push(attribute.trim_end_matches(']').to_owned());
+        } else if let Some(name) = function_name(line) {
+            let indent = indentation(line);
+            let end = (i..lines.len())
+                .find(|&k| (k > i || line.ends_with('}')) && lines[k].ends_with('}') && indentation(lines[k]) == indent)
+                .unwrap_or(i);
+            let body = lines[i..=end].join("\n");
+            found.push(Function {
+                file: file.to_owned(),
+                line: i + 1,
+                name: name.to_owned(),
+                body,
+                ..std::mem::take(&mut pending)
+            });
+        } else {
+            pending = Function::default();
+        }
+    }
+    found
+}
+
+/// The texts of the covers in `function` and in what it calls within its file.
+pub(crate) fn covers(function: &Function, in_file: &[Function]) -> BTreeSet<String> {
+    let mut seen = BTreeSet::from([function.name.as_str()]);
+    let mut left = vec![function];
+    let mut texts = BTreeSet::new();
+    while let Some(f) = left.pop() {
+        for call in f.body.split("cover!(").skip(1) {
+            // the text is the macro's last argument and holds no quote
+            let text = call.split_once(");").and_then(|(arguments, _)| arguments.rsplit('"').nth(1));
+            texts.extend(text.map(str::to_owned));
+        }
+        let words = f.body.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        for word in words.collect::<BTreeSet<_>>() {
+            if let Some(called) = in_file.iter().find(|g| g.name == word).filter(|_| seen.insert(word)) {
+                left.push(called);
+            }
+        }
+    }
+    texts
+}
+
+/// Every Rust source below `folder`, sorted.
+pub(crate) fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let Ok(entries) = fs::read_dir(folder) else { return found };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            if path.file_name().is_none_or(|name| name != "target") {
+                found.extend(rust_files(&path));
+            }
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The functions of a file of the repository.
+pub(crate) fn read(repository: &Path, file: &Path) -> Result<Vec<Function>, String> {
+    let text = fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    Ok(functions(file.strip_prefix(repository).unwrap_or(file), &text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{covers, functions};
+    use std::path::Path;
+
+    const TEXT: &str = r#"
+fn body<T>(share: T) {
+    kani::cover!(share > 0, "positive");
+    kani::cover!(
+        share == 0 && true,
+        "none at all"
+    );
+    helper();
+}
+
+fn helper() { kani::cover!(true, "helped"); }
+
+fn unrelated() {
+    kani::cover!(true, "never asked");
+}
+
+//= specs/equation-03.md#signs
+//= type=test
+//# The sign MUST be
+//# kept.
+/// What it says.
+#[kani::proof]
+#[kani::unwind(3)]
+pub fn proof_it() {
+    body(1);
+}
+
+// nothing
+fn plain() {}
+"#;
+
+    #[test]
+    fn a_function_has_its_citation_attributes_and_text() {
+        let all = functions(Path::new("a.rs"), TEXT);
+        let names: Vec<_> = all.iter().map(|f| f.name.as_str()).collect();
+        assert_eq!(names, ["body", "helper", "unrelated", "proof_it", "plain"]);
+        let proof = &all[3];
+        assert_eq!(proof.citations[0].target, "specs/equation-03.md#signs");
+        assert_eq!(proof.citations[0].quote, "The sign MUST be kept.");
+        assert_eq!(proof.doc, "What it says.");
+        assert_eq!(proof.argument("kani::unwind"), Some("3"));
+        assert!(proof.has("kani::proof") && !proof.has("kani::should_panic"));
+        assert!(all[4].citations.is_empty() && all[4].attributes.is_empty());
+    }
+
+    #[test]
+    fn covers_are_those_of_the_body_and_of_what_it_calls() {
+        let all = functions(Path::new("a.rs"), TEXT);
+        let found: Vec<_> = covers(&all[3], &all).into_iter().collect();
+        assert_eq!(found, ["helped", "none at all", "positive"]);
+    }
+}
