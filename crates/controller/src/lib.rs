@@ -14,10 +14,12 @@
 pub mod allocation;
 pub mod pi;
 pub mod rate;
+pub mod supervisor;
 
 pub use allocation::{ActuationCompensation, Allocation, OrbitCommands};
 pub use pi::{Pi, PiState};
 pub use rate::{Heading, RateLoop};
+pub use supervisor::{Fault, Mode, Orders, Supervisor, SupervisorSettings, SupervisorState, Wish};
 
 use cvg_model::Float;
 
