@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench;
+pub mod carrier;
 pub mod domain;
 pub mod scalar;
 pub mod tolerances;

@@ -151,7 +151,7 @@ impl Settings<'_> {
             lock_s: 1.0,
             spin_up_s: 5.0,
             coast_s: 0.1,
-            endure_s: 0.5,
+            endure_s: 0.3,
             rest_s: 0.5,
             retries: 3,
             forget_s: 10.0,
