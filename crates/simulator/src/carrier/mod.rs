@@ -5,6 +5,7 @@
 //! [`cvg_instrument::Instrument`], the code that runs in firmware. No effect of the library acts here: what it
 //! describes has to come out.
 
+pub mod campaign;
 pub mod converter;
 pub mod plant;
 
