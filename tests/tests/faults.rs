@@ -242,6 +242,8 @@ const ROWS: &[&Row] = &[
     &OVERWRITTEN,
 ];
 
+//= specs/dsp.md#recovery
+//# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
 #[test]
 fn the_documentation_has_a_row_for_every_fault_with_its_ending_and_its_time() {
     let page =

@@ -14,6 +14,8 @@ fn summary(endings: &[Ending]) -> (usize, usize, f64) {
     (times.len(), faults, times.get(times.len() / 2).copied().unwrap_or(f64::NAN))
 }
 
+//= specs/dsp.md#start
+//# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
 /// `CVG_TRIALS=1000 cargo test --release -p cvg-tests --test startup -- --nocapture` is the full count.
 #[test]
 fn devices_start_from_rest_or_end_in_a_named_fault() {

@@ -100,7 +100,8 @@ impl<T: Float> Precession<T> {
             return self.lost(state);
         }
         let scale = T::one() / line;
-        let (cos_2, sin_2) = (p.r * scale, p.s * scale);
+        // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
+        let (cos_2, sin_2) = (p.r * scale, p.s * scale + T::zero());
         let (before_cos, before_sin) = (state.cos_2, state.sin_2);
         let across = sin_2 * before_cos - cos_2 * before_sin;
         let along = cos_2 * before_cos + sin_2 * before_sin;
@@ -112,9 +113,9 @@ impl<T: Float> Precession<T> {
         }
         // Equation 4 jumps by 180° where the negative R axis is crossed
         if cos_2 + before_cos < T::zero() {
-            if before_sin > T::zero() && sin_2 <= T::zero() {
+            if before_sin >= T::zero() && sin_2 < T::zero() {
                 state.half_turns = state.half_turns.saturating_add(1);
-            } else if before_sin <= T::zero() && sin_2 > T::zero() {
+            } else if before_sin < T::zero() && sin_2 >= T::zero() {
                 state.half_turns = state.half_turns.saturating_sub(1);
             }
         }
