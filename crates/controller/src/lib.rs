@@ -16,10 +16,12 @@ pub mod pi;
 #[cfg(any(kani, test, cvg_prove))]
 pub mod proofs;
 pub mod rate;
+pub mod supervisor;
 
 pub use allocation::{ActuationCompensation, Allocation, OrbitCommands};
 pub use pi::{Pi, PiState};
 pub use rate::{Heading, RateLoop};
+pub use supervisor::{Fault, Mode, Orders, Supervisor, SupervisorSettings, SupervisorState, Wish};
 
 use cvg_model::Float;
 

@@ -1,6 +1,8 @@
 //! What the electronics of a whole-angle Coriolis vibratory gyroscope measure.
 //!
-//! The direction of the vibration's major axis ([`direction`]), the pattern angle, unwrapped ([`angle`], Equation 4
+//! The oscillator that makes the reference ([`nco`]) and the demodulator that finds the envelope in carrier samples
+//! ([`demodulator`]), how far the reference is off when nothing is locked yet ([`beat`]), and how the pattern moves from
+//! window to window ([`precession`]). The direction of the vibration's major axis ([`direction`]), the pattern angle, unwrapped ([`angle`], Equation 4
 //! of the paper), the phase-locked loop that keeps the reference on the vibration's phase ([`oscillator`]), and the
 //! inverse of the readout effects that an identification found ([`compensation`]).
 //!
@@ -13,14 +15,22 @@
 #![forbid(unsafe_code)]
 
 pub mod angle;
+pub mod beat;
 pub mod compensation;
+pub mod demodulator;
 pub mod direction;
+pub mod nco;
 pub mod oscillator;
+pub mod precession;
 
 pub use angle::{AngleState, PatternAngle, Period, Reading};
+pub use beat::Beat;
 pub use compensation::Compensation;
+pub use demodulator::{Demodulator, Measurement, Window};
 pub use direction::Direction;
+pub use nco::{Oscillator, Phasor};
 pub use oscillator::{LockState, PhaseLock};
+pub use precession::{Movement, Precession, PrecessionState};
 
 /// Why a configuration was refused when it was built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

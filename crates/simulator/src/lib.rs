@@ -8,11 +8,13 @@
 //! Effects come from the library in `cvg_model::effects` and act in the stage where they say they do: nothing here
 //! names one.
 //!
-//! The crate refuses to identify anything: what it writes is for others to find out. It has no carrier: it simulates
-//! envelopes.
+//! The same loop at the carrier, with plates, converters and the production electronics, is in [`carrier`].
+//!
+//! The crate refuses to identify anything: what it writes is for others to find out.
 #![forbid(unsafe_code)]
 
 pub mod campaign;
+pub mod carrier;
 pub mod closed_loop;
 pub mod noise;
 pub mod plant;

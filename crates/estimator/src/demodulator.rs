@@ -1,0 +1,201 @@
+//! Carrier samples → envelope: mixers and a decimating low-pass that leaves nothing of the carrier.
+//!
+//! A window of N samples is fitted by x = x_c cos φ + x_s sin φ + o in the least-squares sense. The sums Σx cos φ,
+//! Σx sin φ, Σx are the mixers and an integrate-and-dump; what a plain integrate-and-dump would leave of twice the
+//! carrier and of the converter's offset, because N samples are no whole number of periods, the fit takes out exactly.
+//! Its matrix needs no sums over samples: with e^{iφ} the oscillator's phasor and w its step, sums of cosines and sines
+//! are differences of the phasor at the window's two ends,
+//!
+//! $$\sum_{k=0}^{N-1} e^{i\varphi_k} = \frac{e^{i\varphi_N}-e^{i\varphi_0}}{e^{iw}-1},\qquad
+//!   \sum_{k=0}^{N-1} e^{2i\varphi_k} = \frac{e^{2i\varphi_N}-e^{2i\varphi_0}}{e^{2iw}-1}.$$
+//!
+//! The envelope is that of the window's middle: the group delay is (N − 1)/2 samples, whatever N.
+//!
+//! It refuses to repair: a window with a sample that is no number has no envelope.
+
+use cvg_model::{Envelope, Float};
+
+use crate::nco::Phasor;
+use crate::{ConfigError, Status};
+
+/// The demodulator's configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demodulator<T> {
+    samples: u16,
+    per_sample: T,
+    half_samples: T,
+    full_scale_v: T,
+    clip_v: T,
+}
+
+/// A window while it grows: plain data, any content is admissible.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window<T> {
+    /// Σx cos φ, Σx sin φ, Σy cos φ, Σy sin φ
+    pub mixed: Envelope<T>,
+    /// Σx
+    pub x: T,
+    /// Σy
+    pub y: T,
+    /// cosine and sine of the phase at the first sample
+    pub start: (T, T),
+    /// the last samples of both channels
+    pub last: (T, T),
+    /// samples so far
+    pub count: u16,
+    /// samples of either channel that were no finite number
+    pub invalid: u16,
+    /// samples of either channel at the end of the converter's range
+    pub clipped: u16,
+}
+
+/// What one window measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurement<T> {
+    /// the envelope at the window's middle
+    pub envelope: Envelope<T>,
+    /// Σx and Σy: with the last samples, what tells a converter that repeats itself
+    pub fingerprint: [T; 4],
+    /// whether the envelope was measured
+    pub status: Status,
+    /// samples of either channel that were no finite number
+    pub invalid: u16,
+    /// samples of either channel at the end of the converter's range
+    pub clipped: u16,
+}
+
+impl<T: Float> Window<T> {
+    /// An empty window that begins at `phasor`.
+    #[inline]
+    pub fn begin(phasor: &Phasor<T>) -> Self {
+        Self {
+            mixed: Envelope::zero(),
+            x: T::zero(),
+            y: T::zero(),
+            start: (phasor.cos, phasor.sin),
+            last: (T::zero(), T::zero()),
+            count: 0,
+            invalid: 0,
+            clipped: 0,
+        }
+    }
+}
+
+impl<T: Float> Demodulator<T> {
+    /// A demodulator of windows of `samples` (8 to 10,000) for a converter of range ±`full_scale_v` (> 0).
+    ///
+    /// # Errors
+    /// A parameter outside its domain.
+    pub fn new(samples: u16, full_scale_v: f64) -> Result<Self, ConfigError> {
+        if !(8..=10_000).contains(&samples) {
+            return Err(ConfigError { parameter: "samples", expected: "between 8 and 10 000" });
+        }
+        // the square has to be a number in f32 too
+        if !(full_scale_v > 1e-9 && full_scale_v < 1e9) {
+            return Err(ConfigError { parameter: "full_scale_v", expected: "between 1e-9 and 1e9" });
+        }
+        Ok(Self {
+            samples,
+            per_sample: T::from_f64(1.0 / f64::from(samples)),
+            half_samples: T::from_f64(0.5 * f64::from(samples)),
+            full_scale_v: T::from_f64(full_scale_v),
+            clip_v: T::from_f64(full_scale_v * (1.0 - 1e-4)),
+        })
+    }
+
+    /// Samples a window.
+    pub fn samples(&self) -> u16 {
+        self.samples
+    }
+
+    /// Samples by which an envelope is older than the last sample of its window.
+    pub fn group_delay_samples(&self) -> f64 {
+        0.5 * (f64::from(self.samples) - 1.0)
+    }
+
+    /// Adds one sample of each channel, taken at the phase of `phasor`; true when the window is full.
+    #[inline(always)]
+    pub fn accumulate(&self, window: &mut Window<T>, x: T, y: T, phasor: &Phasor<T>) -> bool {
+        let (mut x, mut y) = (x, y);
+        // false for NaN
+        if !(x < self.clip_v && x > -self.clip_v && y < self.clip_v && y > -self.clip_v) {
+            x = self.admit(window, x);
+            y = self.admit(window, y);
+        }
+        window.mixed.x_c = window.mixed.x_c + x * phasor.cos;
+        window.mixed.x_s = window.mixed.x_s + x * phasor.sin;
+        window.mixed.y_c = window.mixed.y_c + y * phasor.cos;
+        window.mixed.y_s = window.mixed.y_s + y * phasor.sin;
+        window.x = window.x + x;
+        window.y = window.y + y;
+        window.count = window.count.wrapping_add(1);
+        let full = window.count >= self.samples;
+        if full {
+            window.last = (x, y);
+        }
+        full
+    }
+
+    /// A sample that is at the end of the range or no number: counted, and made a number within the range.
+    #[cold]
+    #[inline(never)]
+    fn admit(&self, window: &mut Window<T>, v: T) -> T {
+        if !v.is_finite() {
+            window.invalid = window.invalid.saturating_add(1);
+            T::zero()
+        } else if v.magnitude() >= self.clip_v {
+            window.clipped = window.clipped.saturating_add(1);
+            v.bounded(self.full_scale_v)
+        } else {
+            v
+        }
+    }
+
+    /// The envelope of a full window that ends where `end` begins, one sample after its last, with the step that was
+    /// in use in it.
+    #[inline]
+    pub fn finish(&self, window: &Window<T>, end: &Phasor<T>) -> Measurement<T> {
+        let fingerprint = [window.x, window.y, window.last.0, window.last.1];
+        let (invalid, clipped) = (window.invalid, window.clipped);
+        let none = |status| Measurement { envelope: Envelope::zero(), fingerprint, status, invalid, clipped };
+        if invalid > 0 {
+            return none(Status::Invalid);
+        }
+        let (c0, s0) = window.start;
+        let (c1, s1) = (end.cos, end.sin);
+        let (cw, sw) = (end.step_cos, end.step_sin);
+        let (one, two) = (T::one(), T::two());
+        // Σe^{iφ}: conjugate of the denominator over its square, |e^{iw} − 1|² = 2(1 − cos w)
+        let (dc, ds) = (c1 - c0, s1 - s0);
+        let single = one / (two * (one - cw));
+        let sum_c = (dc * (cw - one) + ds * sw) * single;
+        let sum_s = (ds * (cw - one) - dc * sw) * single;
+        // Σe^{2iφ}: e^{2iw} − 1 = 2i sin w e^{iw}
+        let (dc, ds) = (c1 * c1 - s1 * s1 - (c0 * c0 - s0 * s0), two * (c1 * s1 - c0 * s0));
+        let double = one / (two * sw);
+        let sum_2c = (ds * cw - dc * sw) * double;
+        let sum_2s = -(dc * cw + ds * sw) * double;
+        // normal equations, the offset eliminated
+        let (mean_c, mean_s) = (sum_c * self.per_sample, sum_s * self.per_sample);
+        let half = T::half();
+        let cc = self.half_samples + half * sum_2c - sum_c * mean_c;
+        let ss = self.half_samples - half * sum_2c - sum_s * mean_s;
+        let cs = half * sum_2s - sum_c * mean_s;
+        let inverse = one / (cc * ss - cs * cs);
+        let (ic, is, ix) = (cc * inverse, ss * inverse, cs * inverse);
+        let solve = |c: T, s: T, sum: T| {
+            let (c, s) = (c - sum * mean_c, s - sum * mean_s);
+            (is * c - ix * s, ic * s - ix * c)
+        };
+        let (x_c, x_s) = solve(window.mixed.x_c, window.mixed.x_s, window.x);
+        let (y_c, y_s) = solve(window.mixed.y_c, window.mixed.y_s, window.y);
+        // the sum is a number only if all four are, and none is far out of range
+        let size = x_c.magnitude() + x_s.magnitude() + y_c.magnitude() + y_s.magnitude();
+        if size < T::ratio(8, 1) * self.full_scale_v {
+            let envelope = Envelope::new(x_c, x_s, y_c, y_s);
+            Measurement { envelope, fingerprint, status: Status::Valid, invalid, clipped }
+        } else {
+            none(Status::Invalid)
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! How the pattern moves from window to window, without an angle: its precession, jumps, and half turns.
+//!
+//! The unit vector (cos 2θ, sin 2θ) = (R, S)/√(R² + S²) of one window against that of the last gives sin 2Δθ. Its
+//! low-pass is the precession rate, by which a direction that is known late is turned ahead to when it is used. The
+//! count of half turns is that of Equation 4's branch cut being crossed, so that the unwrapped angle is an arctangent
+//! only for whoever reads it.
+
+use cvg_model::{Float, Pendulum, Real};
+
+use crate::{ConfigError, Direction};
+
+/// The tracker's configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Precession<T> {
+    share: T,
+    jump_sin_2: T,
+    lead_windows: T,
+    window_s: T,
+    least_2: T,
+}
+
+/// The tracker's state: plain data, any content is admissible.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrecessionState<T> {
+    /// cos 2θ of the last window, 0 before the first
+    pub cos_2: T,
+    /// sin 2θ of the last window
+    pub sin_2: T,
+    /// low-passed sin 2Δθ from window to window
+    pub sin_2_per_window: T,
+    /// how often θ has passed 90°, with sign: whole periods of 180°
+    pub half_turns: i32,
+}
+
+impl<T: Float> Default for PrecessionState<T> {
+    fn default() -> Self {
+        Self { cos_2: T::zero(), sin_2: T::zero(), sin_2_per_window: T::zero(), half_turns: 0 }
+    }
+}
+
+/// What moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Movement {
+    /// as far as a pattern may move in a window
+    Steady,
+    /// farther
+    Jumped,
+    /// no direction in this window or the last
+    Unknown,
+}
+
+impl<T: Float> Precession<T> {
+    /// A tracker of windows of `window_s` (> 0). The rate's low-pass has the time constant `smoothing_s` (≥ window_s);
+    /// a pattern that moves faster than `fastest_rad_s` and by more than `least_jump_rad` in a window has jumped (a
+    /// jump has to be below 45°); directions are turned ahead by `lead_s` (≥ 0); a line amplitude √(a² − q²) below
+    /// `least_v` has no direction.
+    ///
+    /// # Errors
+    /// A parameter outside its domain.
+    pub fn new(
+        window_s: f64,
+        smoothing_s: f64,
+        fastest_rad_s: f64,
+        least_jump_rad: f64,
+        lead_s: f64,
+        least_v: f64,
+    ) -> Result<Self, ConfigError> {
+        let refused = |parameter, expected| Err(ConfigError { parameter, expected });
+        if !(window_s > 0.0 && window_s.is_finite()) {
+            return refused("window_s", "finite and positive");
+        }
+        if !(smoothing_s >= window_s && smoothing_s.is_finite()) {
+            return refused("smoothing_s", "finite and not below window_s");
+        }
+        let jump = fastest_rad_s * window_s + least_jump_rad;
+        if !(fastest_rad_s > 0.0 && least_jump_rad > 0.0 && jump < core::f64::consts::FRAC_PI_4) {
+            return refused("fastest_rad_s", "positive, and with least_jump_rad below 45 degrees a window");
+        }
+        if !(lead_s >= 0.0 && lead_s < 10.0 * window_s) {
+            return refused("lead_s", "not negative and below ten windows");
+        }
+        if !(least_v > 0.0 && least_v.is_finite()) {
+            return refused("least_v", "finite and positive");
+        }
+        Ok(Self {
+            share: T::from_f64(window_s / smoothing_s),
+            jump_sin_2: T::from_f64(Real::sin_cos(2.0 * jump).0),
+            lead_windows: T::from_f64(lead_s / window_s),
+            window_s: T::from_f64(window_s),
+            least_2: T::from_f64(least_v * least_v),
+        })
+    }
+
+    /// Follows the pattern to the window of the pendulum variables `p`. Total.
+    #[inline]
+    pub fn step(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {
+        let line = p.r.norm(p.s);
+        // false for NaN
+        if !(line > self.least_2 && line.is_finite()) {
+            return self.lost(state);
+        }
+        let scale = T::one() / line;
+        // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
+        let (cos_2, sin_2) = (p.r * scale, p.s * scale + T::zero());
+        let (before_cos, before_sin) = (state.cos_2, state.sin_2);
+        let across = sin_2 * before_cos - cos_2 * before_sin;
+        let along = cos_2 * before_cos + sin_2 * before_sin;
+        (state.cos_2, state.sin_2) = (cos_2, sin_2);
+        // the state may hold anything: a pair that is no unit vector is no last direction
+        if !(along <= T::two() && (along.magnitude() + across.magnitude()) > T::half()) {
+            state.sin_2_per_window = T::zero();
+            return Movement::Unknown;
+        }
+        // Equation 4 jumps by 180° where the negative R axis is crossed
+        if cos_2 + before_cos < T::zero() {
+            if before_sin >= T::zero() && sin_2 < T::zero() {
+                state.half_turns = state.half_turns.saturating_add(1);
+            } else if before_sin < T::zero() && sin_2 >= T::zero() {
+                state.half_turns = state.half_turns.saturating_sub(1);
+            }
+        }
+        if along > T::zero() && across <= self.jump_sin_2 && across >= -self.jump_sin_2 {
+            let held = state.sin_2_per_window.bounded(self.jump_sin_2);
+            state.sin_2_per_window = held + self.share * (across - held);
+            Movement::Steady
+        } else {
+            Movement::Jumped
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn lost(&self, state: &mut PrecessionState<T>) -> Movement {
+        (state.cos_2, state.sin_2) = (T::zero(), T::zero());
+        state.sin_2_per_window = T::zero();
+        Movement::Unknown
+    }
+
+    /// The direction where the pattern will be when it is used. For the small angles of the lead, to second order.
+    #[inline]
+    pub fn ahead(&self, state: &PrecessionState<T>, d: &Direction<T>) -> Direction<T> {
+        let psi = T::half() * state.sin_2_per_window.bounded(self.jump_sin_2) * self.lead_windows;
+        let length = T::one() - T::half() * psi * psi;
+        Direction { cos: d.cos * length - d.sin * psi, sin: d.sin * length + d.cos * psi, status: d.status }
+    }
+
+    /// The precession rate θ̇, low-passed, rad/s.
+    pub fn rate_rad_s(&self, state: &PrecessionState<T>) -> T {
+        T::half() * state.sin_2_per_window.bounded(self.jump_sin_2) / self.window_s
+    }
+}
+
+impl<T: Float> PrecessionState<T> {
+    /// The unwrapped angle as half turns and the angle within (−90°, 90°], rad: **Equation 4** with its jumps counted.
+    /// 0 where there is no direction.
+    pub fn angle(&self) -> (i32, T) {
+        let within = T::half() * self.sin_2.atan2(self.cos_2);
+        (self.half_turns, within.bounded(T::half() * T::PI))
+    }
+
+    /// The unwrapped angle in degrees, in double precision.
+    pub fn degrees(&self) -> f64 {
+        let (half_turns, within) = self.angle();
+        180.0 * f64::from(half_turns) + within.to_f64().to_degrees()
+    }
+}
