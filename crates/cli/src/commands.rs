@@ -11,7 +11,7 @@ use cvg_calibration::{Identification, Options};
 use cvg_simulator::{Scenario, ScenarioError};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{Failure, html, output};
+use crate::{Failure, output, report};
 
 /// `cvg simulate`
 pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
@@ -69,7 +69,7 @@ pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
     };
     show("reading");
     let opened = Campaign::open(campaign)?;
-    let identified = cvg_calibration::identify(opened, &Options { discover: true, progress: &show });
+    let identified = cvg_calibration::identify_with_picture(opened, &Options { discover: true, progress: &show });
     if let Some(bar) = bar.borrow_mut().take() {
         bar.finish_and_clear();
     }
@@ -80,7 +80,7 @@ pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
 pub(crate) fn write_results(identified: &Identification, out: &Path) -> Result<(), Failure> {
     output::write_all(&[
         (out.join("report.json"), report_json(identified)?.as_bytes()),
-        (out.join("report.html"), html::report(identified)?.as_bytes()),
+        (out.join("report.html"), report::page(identified)?.as_bytes()),
         (out.join("calibration.toml"), identified.calibration.to_text().as_bytes()),
     ])
 }

@@ -39,6 +39,7 @@ fn draw(
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if hi > lo { (lo, hi) } else { (0.0, 1.0) }
     };
+    fonts()?;
     let ((x0, x1), (y0, y1)) = (span(|p| p.0), span(|p| p.1));
     let margin = 0.05 * (y1 - y0);
     let root = SVGBackend::with_string(svg, (860, 380)).into_drawing_area();
@@ -78,4 +79,10 @@ fn draw(
         .draw()?;
     root.present()?;
     Ok(())
+}
+
+/// The font that text is measured with, and drawn with in bitmaps: it comes with the program.
+pub(crate) fn fonts() -> Result<(), String> {
+    plotters::style::register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
+        .map_err(|_| "the font that comes with the program cannot be read".to_owned())
 }

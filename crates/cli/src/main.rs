@@ -4,11 +4,13 @@
 //! standard error; standard output carries results only.
 #![forbid(unsafe_code)]
 
+mod clouds;
 mod commands;
 mod demo;
 mod figure;
-mod html;
 mod output;
+mod report;
+mod standard;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
