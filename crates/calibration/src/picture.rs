@@ -4,14 +4,14 @@
 use cvg_model::effects::{EffectId, Moment, Scaling};
 use nalgebra::DMatrix;
 
-use crate::evaluate::{Evaluation, evaluate};
-use crate::fit::{Fit, Window};
+use crate::evaluate::Evaluation;
+use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Unknown, Unknowns, Vibration};
 use crate::identify::Bench;
+use crate::pass::{Pace, Start, walk};
 use crate::recording::{Instrument, Role};
-use crate::residual::{
-    Follows, Harmonic, WHITENESS_LAGS, autocorrelation, harmonics, inflation, resolved_harmonics,
-};
+use crate::residual::{Follows, Harmonic, WHITENESS_LAGS, autocorrelation, harmonics, inflation, resolved_harmonics};
+use crate::statistics::{circular_mean, line};
 use crate::track::wrapped;
 
 /// Curves for the figures of a report.
@@ -156,6 +156,8 @@ const AMPLITUDE_HARMONICS: usize = 4;
 const SHOWN_HARMONICS: u32 = 8;
 /// Lags of the autocorrelation.
 const LAGS: usize = 60;
+/// A sample further off than this is a spike whatever a hypothesis lacks.
+const FAR_OFF_RAD: f64 = 0.05;
 /// Bins and half width, in deviations, of the histogram.
 const HISTOGRAM_BINS: usize = 61;
 const HISTOGRAM_DEVIATIONS: f64 = 5.0;
@@ -239,8 +241,7 @@ impl Scene<'_> {
             let seen = track.envelope(i);
             let commands = track.commands(i, stride)?;
             let rate = track.rate(i);
-            let at =
-                Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: h.precession(rate) };
+            let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: h.precession(rate) };
             h.evaluate(seen, Some(commands), &at, &none, &mut with);
             h.evaluate(seen, None, &at, &none, &mut without);
             let push = with.growth - without.growth;
@@ -271,8 +272,7 @@ impl Scene<'_> {
 
     fn stages(&self) -> Vec<(String, Vec<Harmonic>)> {
         // the noise is that of the last stage: what the others have besides is no noise
-        let inflated =
-            inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
+        let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         [("raw", self.raw), ("declared", Some(self.declared)), ("discovered", Some(self.discovered))]
             .into_iter()
             .filter_map(|(name, e)| e.map(|e| (name, e)))
@@ -343,16 +343,13 @@ impl Scene<'_> {
         let id = without.members.remove(at).id;
         let mut shares = vec![Share::default(); self.bench.tracks.len()];
         for (role, with) in [(Role::Fit, self.on_fit), (Role::Holdout, self.discovered)] {
-            let bare = evaluate(&self.bench.tracks, &without, &self.fit.starts, role, Window::Whole, Some(with));
-            for ((s, b), kept) in with.segments.iter().zip(&bare.segments).zip(&with.kept) {
-                let share = &mut shares[s.track];
-                for i in (0..s.angle.len().min(b.angle.len())).filter(|&i| kept[i]) {
-                    share.add(s.angle[i], wrapped(b.angle[i] - s.angle[i], self.hypothesis().period_rad));
+            for ((s, bare), kept) in with.segments.iter().zip(self.errors_of(&without, role, with)).zip(&with.kept) {
+                for i in (0..s.angle.len().min(bare.len())).filter(|&i| kept[i]) {
+                    shares[s.track].add(s.angle[i], bare[i] - s.angle[i]);
                 }
             }
         }
-        let inflated =
-            inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
+        let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         let runs = shares.iter().enumerate().filter(|(_, s)| s.count > 0.0 && s.dd > 0.0).map(|(number, s)| {
             let track = &self.bench.tracks[number].track;
             let fitted = (s.dd / s.count).sqrt();
@@ -366,6 +363,40 @@ impl Scene<'_> {
             }
         });
         EffectSizes { id, scaling: id.description().scaling, runs: runs.collect() }
+    }
+
+    /// Errors of a hypothesis that lacks something, per segment of `role`, lines taken out as in `like`. What it lacks is
+    /// no spike: only what is far off is passed over.
+    fn errors_of(&self, hypothesis: &Hypothesis, role: Role, like: &Evaluation) -> Vec<Vec<f64>> {
+        let none = Unknowns::new(hypothesis, Vec::new());
+        let mut out = Vec::new();
+        for (prepared, starts) in self.bench.tracks.iter().zip(&self.fit.starts) {
+            let track = &prepared.track;
+            for (segment, start) in track.segments.iter().zip(starts).filter(|(s, _)| s.role == role) {
+                let Some(kept) = like.kept.get(out.len()) else { return out };
+                let walked = |start: Start, pace: Pace| {
+                    let (mut turned, mut angle) = (Vec::new(), Vec::new());
+                    walk(track, segment, hypothesis, &none, start, pace, |row| {
+                        turned.push(row.turned);
+                        angle.push(row.angle);
+                    });
+                    (turned, angle)
+                };
+                let coarse = Pace::every(track.stride * (segment.range.len() / (track.stride * 500)).max(1));
+                let middle = |angle: Vec<f64>| circular_mean(angle.into_iter(), hypothesis.period_rad);
+                let mut start = *start;
+                start.angle += middle(walked(start, coarse).1);
+                let (turned, mut angle) = walked(start, Pace { stride: track.stride, spike: FAR_OFF_RAD });
+                let centre = middle(angle.clone());
+                for a in &mut angle {
+                    *a = wrapped(*a - centre, hypothesis.period_rad);
+                }
+                let of_kept = |v: &[f64]| v.iter().zip(kept).filter(|(_, k)| **k).map(|(v, _)| *v).collect::<Vec<_>>();
+                let (slope, intercept) = line(&of_kept(&turned), &of_kept(&angle));
+                out.push(angle.iter().zip(&turned).map(|(a, t)| a - slope * t - intercept).collect());
+            }
+        }
+        out
     }
 
     fn correlations(&self) -> Correlations {

@@ -19,7 +19,11 @@ pub(crate) fn entries(r: &Report) -> Vec<Entry> {
     let entry = |term, here, value: String| Entry { term, here, value };
     let k = r.angular_gain;
     let mut out = vec![
-        entry("scale factor", "angular gain k: pattern angle per input angle", format!("{:.7} ± {:.1e}", k.value, k.half_width())),
+        entry(
+            "scale factor",
+            "angular gain k: pattern angle per input angle",
+            format!("{:.7} ± {:.1e}", k.value, k.half_width()),
+        ),
         entry(
             "scale factor",
             "drift of it: effect scale-drift",

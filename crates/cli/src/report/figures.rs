@@ -2,6 +2,7 @@
 
 use cvg_calibration::picture::{EffectSizes, Picture};
 use cvg_calibration::{BiasCurve, Identification};
+use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
 
 /// One figure.
@@ -35,6 +36,10 @@ impl Figure {
 
 /// Markers of one stage in the figure of the bias.
 const BIAS_POINTS: usize = 1200;
+/// Ticks of an amplitude.
+const TICKS: [f64; 13] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 5.0, 10.0];
+/// Runs that the figure of the energy control can show.
+const DRIVES: usize = 3;
 /// Colours of runs, in turn.
 const INKS: [&str; 7] = ["@declared", "@raw", "@discovered", "@4", "@5", "@6", "@7"];
 
@@ -106,7 +111,7 @@ fn bias(identified: &Identification) -> Figure {
             "hovertemplate": "%{x:.2f}°: %{y:.5f}°<br>%{text}",
         }));
     }
-    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("angle error [deg]")});
+    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("angle error [deg]"), "showlegend": false});
     let caption = "Angle minus the best line on held-out data, before any compensation, after the paper's model, and \
                    after all. Switch off a stage to enlarge the others.";
     Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
@@ -139,14 +144,15 @@ fn ring_downs(identified: &Identification) -> Option<Figure> {
     let traces = downs.iter().zip(INKS.iter().cycle()).map(|(r, ink)| {
         json!({
             "type": "scatter", "mode": "lines", "line": {"color": ink, "width": 2},
-            "name": format!("{:.0}°: τ = {:.3} ± {:.3} s", r.angle_rad.to_degrees(), r.tau_s, 1.96 * r.tau_error_s),
+            // a rounded angle below zero is not to read −0
+            "name": format!("{:.0}°: τ = {:.4} ± {:.4} s", r.angle_rad.to_degrees().round() + 0.0, r.tau_s, 1.96 * r.tau_error_s),
             "x": shorts(r.decay.iter().map(|p| p.0)), "y": shorts(r.decay.iter().map(|p| p.1)),
             "hovertemplate": "%{x:.2f} s: %{y:.5f} V",
         })
     });
     let layout = json!({
         "xaxis": axis("time [s]"),
-        "yaxis": {"title": {"text": "amplitude [V]"}, "type": "log", "dtick": "D2"},
+        "yaxis": {"title": {"text": "amplitude [V]"}, "type": "log", "tickvals": TICKS},
     });
     let caption = "Amplitude with the pattern held, the energy loop on and then off. Straight lines are exponential \
                    decays; their slope is the damping of that direction (run-down).";
@@ -154,11 +160,15 @@ fn ring_downs(identified: &Identification) -> Option<Figure> {
 }
 
 fn drive(picture: &Picture) -> Option<Figure> {
-    let fastest = picture.drives.iter().map(|d| d.rate_dps.abs()).fold(0.0, f64::max);
-    let shown = picture.drives.iter().position(|d| d.rate_dps.abs() == fastest)?;
+    // the fastest run, the slowest, and those between
+    let mut drives: Vec<_> = picture.drives.iter().collect();
+    drives.sort_by(|a, b| b.rate_dps.abs().total_cmp(&a.rate_dps.abs()));
+    let last = drives.len().checked_sub(1)?;
+    let mut shown: Vec<usize> = [0, last, last / 2].into_iter().take(DRIVES).collect();
+    shown.dedup();
     let mut traces = Vec::new();
-    for (number, d) in picture.drives.iter().enumerate() {
-        let visible = if number == shown { json!(true) } else { json!("legendonly") };
+    for (number, d) in shown.into_iter().map(|at| drives[at]).enumerate() {
+        let visible = if number == 0 { json!(true) } else { json!("legendonly") };
         let run = run_name(&d.name);
         let stages = [("before", &d.before_v, "circle", "@raw"), ("after", &d.after_v, "diamond", "@discovered")];
         for (stage, values, symbol, ink) in stages {
@@ -191,7 +201,8 @@ fn harmonics(picture: &Picture) -> Option<Figure> {
         "barmode": "group", "xaxis": axis("harmonic of the pattern angle"),
         "yaxis": {"title": {"text": "amplitude [deg]"}, "type": "log", "exponentformat": "power", "dtick": 1},
     });
-    let caption = "Of the held-out error, at each stage, with 95 % intervals. A bar no higher than its interval is noise.";
+    let caption =
+        "Of the held-out error, at each stage, with 95 % intervals. A bar no higher than its interval is noise.";
     any.then(|| Figure::new("harmonics", "Harmonics", caption, traces.collect(), layout))
 }
 
@@ -230,7 +241,8 @@ fn memory(picture: &Picture) -> Option<Figure> {
         "shapes": [{"type": "rect", "x0": 0.5, "x1": end, "y0": -m.band99, "y1": m.band99, "fillcolor": "@band",
                     "line": {"width": 1, "color": "@muted", "dash": "dot"}}],
     });
-    let caption = format!("Of the residual. White noise stays within the band, ± {:.4}, at 99 % of the lags.", m.band99);
+    let caption =
+        format!("Of the residual. White noise stays within the band, ± {:.4}, at 99 % of the lags.", m.band99);
     Some(Figure::new("autocorrelation", "Autocorrelation", caption, traces, layout))
 }
 
@@ -280,7 +292,10 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
             "marker": {"size": 8, "color": "@declared", "symbol": "circle"},
             "hovertemplate": "%{text}<br>%{x:.4g}: %{y:.3g}°",
         }));
-        let level = runs.iter().map(|r| (r.fitted_deg * reduce(r)).max(f64::MIN_POSITIVE).ln() - f64::from(*power) * (x(r) / x_0).max(f64::MIN_POSITIVE).ln());
+        let level = runs.iter().map(|r| {
+            (r.fitted_deg * reduce(r)).max(f64::MIN_POSITIVE).ln()
+                - f64::from(*power) * (x(r) / x_0).max(f64::MIN_POSITIVE).ln()
+        });
         let level = (level.sum::<f64>() / runs.len() as f64).exp();
         let (lo, hi) = xs.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
         let (lo, hi) = if lo < 0.98 * hi { (lo, hi) } else { (0.9 * lo, 1.1 * hi) };
@@ -304,13 +319,19 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
         -1 => format!("falls as one over the {of}"),
         n => format!("goes as the {of} to the power {n}"),
     };
+    let through = if sizes.id == EffectId::Anisoelasticity {
+        " It acts through the quadrature that the loop leaves, so the law is a rough one."
+    } else {
+        ""
+    };
     let caption = format!(
-        "{}: by its definition it {} and {}. Each point is what one run alone says of it, with its 95 % interval.",
+        "{}: by its definition it {} and {}.{through} Each point is what one run alone says of it, with its 95 % interval.",
         sizes.id.description().title,
         law(p, "rate"),
         law(q, "amplitude")
     );
-    (runs.len() > 1).then(|| Figure::new(&format!("scaling-{id}"), &format!("Scaling of {id}"), caption, traces, layout))
+    (runs.len() > 1)
+        .then(|| Figure::new(&format!("scaling-{id}"), &format!("Scaling of {id}"), caption, traces, layout))
 }
 
 fn correlations(picture: &Picture) -> Option<Figure> {

@@ -15,7 +15,15 @@ pub(super) fn degrees(value: f64) -> String {
         return "—".into();
     }
     let size = value.abs();
-    let digits = if size >= 0.1 { 3 } else if size >= 0.01 { 4 } else if size >= 0.001 { 5 } else { 6 };
+    let digits = if size >= 0.1 {
+        3
+    } else if size >= 0.01 {
+        4
+    } else if size >= 0.001 {
+        5
+    } else {
+        6
+    };
     format!("{value:.digits$}°")
 }
 
@@ -66,7 +74,8 @@ pub(super) fn finding(r: &Report) -> String {
 fn name(e: &EffectReport) -> String {
     let title = EffectId::from_id(&e.id).map_or(e.id.as_str(), |id| id.description().title);
     let value = e.parameters.first().filter(|p| p.ci95.is_some());
-    let value = value.map(|p| format!("{} = {}", p.name, super::commands::significant(p.value)));
+    let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
+    let value = value.map(|p| format!("{} = {}{}", p.name, super::commands::significant(p.value), unit(&p.unit)));
     value.map_or(title.to_owned(), |v| format!("{title} ({v})"))
 }
 

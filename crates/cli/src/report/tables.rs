@@ -65,9 +65,8 @@ fn parameters(h: &mut String, identified: &Identification) {
         }
         for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));
-            let interval = p.ci95.map_or("set by a search".into(), |c| {
-                format!("{} … {}", significant(c[0]), significant(c[1]))
-            });
+            let interval =
+                p.ci95.map_or("set by a search".into(), |c| format!("{} … {}", significant(c[0]), significant(c[1])));
             row(h, &[&name, &significant(p.value), &interval, &escape(&p.unit)]);
         }
     });
@@ -91,7 +90,8 @@ fn parameters(h: &mut String, identified: &Identification) {
 
 fn effects(h: &mut String, r: &Report) {
     h.push_str("<h2 id=\"effects\">Effects</h2>");
-    let columns = ["effect", "origin", "held-out rms [deg]", "evidence", "confounded with, and the run that would tell"];
+    let columns =
+        ["effect", "origin", "held-out rms [deg]", "evidence", "confounded with, and the run that would tell"];
     table(h, "What the data supports", &columns, |h| {
         for e in &r.effects {
             let change = e.heldout_rms_deg.map(|b| format!("{:.5} → {:.5}", b.before, b.after)).unwrap_or_default();
