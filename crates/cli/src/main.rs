@@ -9,6 +9,7 @@ mod commands;
 mod demo;
 mod figure;
 mod output;
+mod paper;
 mod report;
 mod standard;
 
@@ -66,6 +67,12 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Figures 2, 3 and 4 of the paper from our models, as SVG, PNG and CSV, and its numbers beside ours
+    Paper {
+        /// Folder for figures, data and table
+        #[arg(long)]
+        out: PathBuf,
+    },
     /// Take the identified errors out of a recording
     Compensate {
         /// calibration.toml from `cvg identify`
@@ -92,6 +99,7 @@ fn main() -> ExitCode {
         Command::Demo { out, json } => demo::demo(&out, json),
         Command::Simulate { scenario, out } => commands::simulate(&scenario, &out),
         Command::Identify { campaign, out, json } => commands::identify(&campaign, out.as_deref(), json),
+        Command::Paper { out } => paper::paper(&out),
         Command::Compensate { calibration, recording, out } => commands::compensate(&calibration, &recording, &out),
     };
     match outcome {
