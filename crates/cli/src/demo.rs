@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use cvg_calibration::Identification;
+use cvg_calibration::recording::Campaign;
 use cvg_simulator::Scenario;
 
 use crate::{Failure, clouds, commands, output};
@@ -17,7 +18,7 @@ pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
     eprintln!("simulating the paper's device into {}", campaign.display());
     Scenario::paper().simulate().write(&campaign).map_err(Failure::input)?;
     eprintln!("identifying it from its recordings");
-    let identified = commands::run(&campaign.join("campaign.toml"))?;
+    let identified = commands::run(|| Ok(Campaign::open(&campaign.join("campaign.toml"))?))?;
     commands::write_results(&identified, out)?;
     output::write(&out.join("bias.svg"), clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
     if json {
