@@ -12,6 +12,7 @@ use crate::fit::{Fit, Window, block_covariance};
 use crate::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::identifiability::{confounded_with, separated_by};
 use crate::identify::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::picture::{Picture, Scene};
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::{
     BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA,
@@ -44,6 +45,8 @@ pub struct Identification {
     pub figures: Figures,
     /// the steps of discovery
     pub steps: Vec<Step>,
+    /// what a person wants to see besides, where it was asked for
+    pub picture: Option<Picture>,
 }
 
 /// Curves for a report, thinned to what a figure can show.
@@ -87,6 +90,18 @@ const WHITENESS_LEVEL: f64 = 0.01;
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
 pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identification, Refusal> {
+    run(campaign, options, false)
+}
+
+/// [`identify`], with the curves of a report's figures.
+///
+/// # Errors
+/// As [`identify`].
+pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Result<Identification, Refusal> {
+    run(campaign, options, true)
+}
+
+fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
     (options.progress)("preparing the runs");
@@ -127,6 +142,21 @@ pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identificat
             e.separated_by.as_deref().unwrap_or("another run")
         ));
     }
+    let picture = pictured.then(|| {
+        let members = &fitted.fit.hypothesis.members;
+        let told: Vec<usize> = (0..members.len()).filter(|&at| knowledge.told(at, &members[at])).collect();
+        let scene = Scene {
+            bench: &bench,
+            fit: &fitted.fit,
+            covariance: &covariance,
+            raw: raw.as_ref(),
+            declared: &before,
+            discovered: &after,
+            on_fit: &on_fit,
+            members: &told,
+        };
+        scene.picture()
+    });
     let spikes = fitted.fit.set_aside + after.spikes();
     if spikes > 0 {
         warnings.push(format!("{spikes} samples were set aside as spikes"));
@@ -171,6 +201,7 @@ pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identificat
         figures: figures(&bench, raw.as_ref(), &before, &after, fitted.ring_downs),
         calibration: Calibration { device, hypothesis: fitted.fit.hypothesis },
         steps,
+        picture,
     })
 }
 

@@ -5,13 +5,15 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::time::Duration;
 
+use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::{Campaign, Recording};
+use cvg_calibration::recording::{Campaign, Naming};
 use cvg_calibration::{Identification, Options};
 use cvg_simulator::{Scenario, ScenarioError};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{Failure, html, output};
+use crate::arguments::Arguments;
+use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
 pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
@@ -36,11 +38,16 @@ fn scenario_problem(error: &ScenarioError, text: &str) -> String {
 }
 
 /// `cvg identify`: files where a folder is given, a summary or the report on standard output.
-pub(crate) fn identify(campaign: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+pub(crate) fn identify(
+    open: impl FnOnce() -> Result<Campaign, Failure>,
+    out: Option<&Path>,
+    json: bool,
+) -> Result<(), Failure> {
     out.map_or(Ok(()), output::check_folder)?;
-    let identified = run(campaign)?;
+    let identified = run(open)?;
     if let Some(out) = out {
         write_results(&identified, out)?;
+        eprintln!("wrote {}", out.join("report.html").display());
     }
     if json {
         println!("{}", report_json(&identified)?);
@@ -51,7 +58,7 @@ pub(crate) fn identify(campaign: &Path, out: Option<&Path>, json: bool) -> Resul
 }
 
 /// Identifies a campaign, with a spinner where a person is watching.
-pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
+pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Identification, Failure> {
     let bar = RefCell::new(None::<ProgressBar>);
     let started = std::time::Instant::now();
     let show = |what: &str| {
@@ -68,8 +75,8 @@ pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
         }
     };
     show("reading");
-    let opened = Campaign::open(campaign)?;
-    let identified = cvg_calibration::identify(opened, &Options { discover: true, progress: &show });
+    let opened = open()?;
+    let identified = cvg_calibration::identify_with_picture(opened, &Options { discover: true, progress: &show });
     if let Some(bar) = bar.borrow_mut().take() {
         bar.finish_and_clear();
     }
@@ -80,7 +87,7 @@ pub(crate) fn run(campaign: &Path) -> Result<Identification, Failure> {
 pub(crate) fn write_results(identified: &Identification, out: &Path) -> Result<(), Failure> {
     output::write_all(&[
         (out.join("report.json"), report_json(identified)?.as_bytes()),
-        (out.join("report.html"), html::report(identified)?.as_bytes()),
+        (out.join("report.html"), report::page(identified)?.as_bytes()),
         (out.join("calibration.toml"), identified.calibration.to_text().as_bytes()),
     ])
 }
@@ -91,9 +98,9 @@ pub(crate) fn report_json(identified: &Identification) -> Result<String, Failure
 }
 
 /// `cvg compensate`
-pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path) -> Result<(), Failure> {
+pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, naming: &Naming) -> Result<(), Failure> {
     let calibration = Calibration::read(calibration)?;
-    let recording = Recording::read(recording)?;
+    let recording = input::recording(recording, naming)?;
     recording.require_rotation()?;
     for w in &recording.warnings {
         eprintln!("warning: {w}");
@@ -108,6 +115,27 @@ pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path) -> Re
     .map_err(|e| Failure::input(format!("{}: {e}", out.display())))?;
     output::write(out, &bytes)?;
     eprintln!("wrote {}", out.display());
+    Ok(())
+}
+
+/// `cvg man`: a manual page for the program and for each of its commands.
+pub(crate) fn manual(out: &Path) -> Result<(), Failure> {
+    output::check_folder(out)?;
+    let program = Arguments::command();
+    let mut pages = vec![("cvg.1".to_owned(), program.clone())];
+    for command in program.get_subcommands() {
+        let name = format!("cvg-{}", command.get_name());
+        pages.push((format!("{name}.1"), command.clone().name(name)));
+    }
+    let mut written = Vec::new();
+    for (file, command) in pages {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(command).render(&mut page).map_err(Failure::input)?;
+        written.push((out.join(file), page));
+    }
+    let files: Vec<_> = written.iter().map(|(path, page)| (path.clone(), page.as_slice())).collect();
+    output::write_all(&files)?;
+    eprintln!("wrote {} pages into {}", files.len(), out.display());
     Ok(())
 }
 

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use cvg_calibration::Identification;
+use cvg_calibration::recording::Campaign;
 use cvg_simulator::Scenario;
 
-use crate::{Failure, commands, html, output};
+use crate::{Failure, clouds, commands, output};
 
 /// Points of the figure that the README shows.
 const README_POINTS: usize = 900;
@@ -17,9 +18,9 @@ pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
     eprintln!("simulating the paper's device into {}", campaign.display());
     Scenario::paper().simulate().write(&campaign).map_err(Failure::input)?;
     eprintln!("identifying it from its recordings");
-    let identified = commands::run(&campaign.join("campaign.toml"))?;
+    let identified = commands::run(|| Ok(Campaign::open(&campaign.join("campaign.toml"))?))?;
     commands::write_results(&identified, out)?;
-    output::write(&out.join("bias.svg"), html::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
+    output::write(&out.join("bias.svg"), clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
     if json {
         println!("{}", commands::report_json(&identified)?);
         return Ok(());

@@ -4,100 +4,76 @@
 //! standard error; standard output carries results only.
 #![forbid(unsafe_code)]
 
+mod arguments;
+mod clouds;
 mod commands;
 mod demo;
 mod figure;
-mod html;
+mod input;
+mod inspect;
+mod library;
 mod output;
+mod paper;
+mod report;
+mod standard;
 
-use std::path::PathBuf;
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, Parser};
 
-/// Find, explain and remove the angle errors of whole-angle gyroscopes and sin/cos sensors.
-#[derive(Parser)]
-#[command(name = "cvg", version, about, after_help = EXAMPLES)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-const EXAMPLES: &str = "\
-Examples:
-  cvg demo                                          the paper's device, simulated, identified, compensated
-  cvg identify campaign.toml --out results          the main job: report.html, report.json, calibration.toml
-  cvg identify rot+500.csv --out results            one recording is a campaign of one run
-  cvg compensate results/calibration.toml rot.csv --out rot-compensated.csv
-  cvg simulate scenario.toml --out bench            a campaign, and what it was set to
-
-Exit status: 0 done, 1 the data does not allow an answer, 2 bad use or bad input.";
-
-#[derive(Subcommand)]
-enum Command {
-    /// The paper's device end to end: simulate, identify, compensate, report
-    Demo {
-        /// Folder for campaign and results
-        #[arg(long, default_value = "cvg-demo")]
-        out: PathBuf,
-        /// Print report.json and nothing else to standard output
-        #[arg(long)]
-        json: bool,
-    },
-    /// Simulate a scenario: a campaign of recordings, and what it was set to
-    Simulate {
-        /// Scenario file (TOML)
-        scenario: PathBuf,
-        /// Folder for the campaign
-        #[arg(long)]
-        out: PathBuf,
-    },
-    /// Identify the instrument of a campaign: what is wrong with it, and the error before and after
-    Identify {
-        /// campaign.toml, or a single recording (CSV or Parquet)
-        campaign: PathBuf,
-        /// Folder for report.json, report.html and calibration.toml; without it only the summary is printed
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Print report.json and nothing else to standard output
-        #[arg(long)]
-        json: bool,
-    },
-    /// Take the identified errors out of a recording
-    Compensate {
-        /// calibration.toml from `cvg identify`
-        calibration: PathBuf,
-        /// Recording (CSV or Parquet)
-        recording: PathBuf,
-        /// File for the compensated recording (CSV, or Parquet where the name ends in .parquet)
-        #[arg(long)]
-        out: PathBuf,
-    },
-}
+use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if error.use_stderr() => {
-            eprintln!("{}", bad_use(&error));
+            say(&bad_use(&error));
             return ExitCode::from(2);
         }
         // help and version were asked for
         Err(error) => error.exit(),
     };
-    let outcome = match arguments.command {
-        Command::Demo { out, json } => demo::demo(&out, json),
-        Command::Simulate { scenario, out } => commands::simulate(&scenario, &out),
-        Command::Identify { campaign, out, json } => commands::identify(&campaign, out.as_deref(), json),
-        Command::Compensate { calibration, recording, out } => commands::compensate(&calibration, &recording, &out),
-    };
-    match outcome {
+    match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("error: {}", failure.message);
+            say(&format!("error: {}", failure.message));
             ExitCode::from(failure.status)
         }
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo { out, json } => demo::demo(&out, json),
+        Command::Simulate { scenario, out } => commands::simulate(&scenario, &out),
+        Command::Inspect { files, mapping, plot, json } => {
+            inspect::inspect(&files, &mapping.naming()?, plot.as_deref(), json)
+        }
+        Command::Identify { campaign, out, json, mapping, holdout, settle } => {
+            let naming = mapping.naming()?;
+            commands::identify(|| input::campaign(&campaign, &naming, &holdout, settle), out.as_deref(), json)
+        }
+        Command::Compensate { calibration, recording, out, mapping } => {
+            commands::compensate(&calibration, &recording, &out, &mapping.naming()?)
+        }
+        Command::Effects { effect, json, markdown } => library::effects(effect.as_deref(), json, markdown),
+        Command::Paper { out } => paper::paper(&out),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Arguments::command(), "cvg", &mut std::io::stdout());
+            Ok(())
+        }
+        Command::Man { out } => commands::manual(&out),
+    }
+}
+
+/// Says why on standard error; in colour where a person reads it and has not asked for none (NO_COLOR).
+fn say(text: &str) {
+    let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty()) || !std::io::stderr().is_terminal();
+    match text.strip_prefix("error:").filter(|_| !plain) {
+        Some(rest) => eprintln!("\u{1b}[1;31merror:\u{1b}[0m{rest}"),
+        None => eprintln!("{text}"),
     }
 }
 

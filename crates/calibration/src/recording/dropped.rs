@@ -41,7 +41,7 @@ pub struct Dropped {
     pub repeated_time: Tally,
     /// The last row, dropped because it is cut off.
     pub truncated_last_line: Tally,
-    /// Lines with nothing in them; they are not rows.
+    /// Lines with nothing in them, or a remark that begins with `#` or `%`; they are not rows.
     pub blank_lines: Tally,
     /// Rows kept with a NaN where a controller output or the temperature is empty, NaN or infinite, by column. Counted
     /// over all rows of the file.

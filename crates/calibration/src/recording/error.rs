@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::channel::Channel;
+
 /// Where in a file: lines of text start at 1 (the header counts), rows of a table without lines as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Place {
@@ -204,6 +206,28 @@ pub enum ReadError {
         path: PathBuf,
         /// What is wrong, and what would be right.
         what: String,
+    },
+    /// A file of arrays cannot be decoded.
+    #[error("{}: is not {kind} that can be read here: {what}", path.display())]
+    Container {
+        /// The path as given.
+        path: PathBuf,
+        /// What it should be.
+        kind: &'static str,
+        /// What is wrong.
+        what: String,
+    },
+    /// A column that a channel is mapped to is not there.
+    #[error("{}: `{channel}` is mapped to a column `{column}` that is not there; there are {present}", path.display())]
+    MappedColumn {
+        /// The path as given.
+        path: PathBuf,
+        /// The channel.
+        channel: Channel,
+        /// The column.
+        column: String,
+        /// The columns that are there.
+        present: String,
     },
     /// The campaign file says something that it cannot mean.
     #[error("{}: line {line}, column {column}: {what}; wanted {wanted}", path.display())]

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::channel::Channel;
 use super::error::ReadError;
+use super::naming::Naming;
 use super::requirement;
 
 /// What a column of the file holds.
@@ -32,11 +33,11 @@ pub(super) struct Layout {
 
 impl Layout {
     /// Understands the names in a header. Nameless columns are unknown columns, and may be many.
-    pub(super) fn new<S: AsRef<str>>(header: &[S], source: &Path) -> Result<Self, ReadError> {
+    pub(super) fn new<S: AsRef<str>>(header: &[S], naming: &Naming, source: &Path) -> Result<Self, ReadError> {
         let mut layout = Self { names: vec![], fields: vec![], channels: vec![], unknown: vec![] };
         for name in header {
             let name = name.as_ref().trim();
-            if let Some(channel) = Channel::of(name) {
+            if let Some(channel) = naming.channel(name) {
                 layout.fields.push(Field::Number(layout.channels.len()));
                 layout.channels.push(channel);
                 layout.names.push(channel.name().to_owned());
@@ -47,6 +48,7 @@ impl Layout {
             }
         }
         layout.refuse_duplicates(source)?;
+        naming.require(&layout.channels, layout.names.iter().map(String::as_str), source)?;
         if requirement::holds_an_angle(|channel| layout.channels.contains(&channel)) {
             return Ok(layout);
         }

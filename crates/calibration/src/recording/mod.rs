@@ -1,18 +1,20 @@
 //! Recordings and campaigns: files in, columns of numbers out, and what is wrong with a file and where.
 //!
-//! A recording is read from CSV (RFC 4180 and its usual dialects) or Parquet. Dirt that has one meaning is handled: rows
+//! A recording is read from CSV (RFC 4180 and its usual dialects), Parquet, MATLAB's `.mat` or HDF5. Dirt that has one meaning is handled: rows
 //! without a time, a reference or an angle, repeated time stamps and a cut-off last line are dropped, counted
 //! ([`Dropped`]) and said in [`Recording::warnings`]. Dirt that could mean two things is refused with file, line and
 //! column ([`ReadError`]). No value is ever changed or made up, and nothing here judges the instrument: spikes, rates
 //! and angles are the identification's.
 
 mod admission;
+mod arrays;
 mod campaign;
 mod channel;
 mod csv;
 mod dropped;
 mod error;
 mod layout;
+mod naming;
 mod open;
 mod parquet;
 mod requirement;
@@ -25,6 +27,7 @@ pub use campaign::{Campaign, Instrument, Role, Run, RunKind};
 pub use channel::Channel;
 pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};
+pub use naming::Naming;
 pub use unknown::{Cells, UnknownColumn};
 
 /// One recording: columns of equal length, one value a row.

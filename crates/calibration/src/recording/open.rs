@@ -7,32 +7,74 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 
 use super::error::ReadError;
-use super::{Recording, csv, parquet};
+use super::naming::Naming;
+use super::{Recording, arrays, csv, parquet};
 
-const WANTED: &str = "CSV text in UTF-8, or Parquet";
+const WANTED: &str = "CSV text in UTF-8, Parquet, MATLAB's .mat or HDF5";
+/// First bytes that tell every kind of file.
+const HEAD: u64 = 16;
 
 impl Recording {
-    /// Reads a recording: Parquet where the file begins with `PAR1`, CSV otherwise.
+    /// Reads a recording: Parquet, MATLAB's `.mat` (version 5 or 7.3) or HDF5 by their first bytes, CSV otherwise.
     ///
     /// # Errors
     /// [`ReadError`]: the file is not there, is no recording, has no time or no angle, or has dirt that could mean two
     /// things. Whether the columns suffice for a run is asked with [`Recording::require_rotation`] and
     /// [`Recording::require_ringdown`].
     pub fn read(path: &Path) -> Result<Self, ReadError> {
+        Self::read_named(path, Naming::NONE)
+    }
+
+    /// Reads a recording whose columns have names of their own.
+    ///
+    /// # Errors
+    /// As [`Recording::read`], and where a mapped column is not there.
+    pub fn read_named(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
         let io = |error| ReadError::io(path, error);
         let mut file = File::open(path).map_err(io)?;
         let metadata = file.metadata().map_err(io)?;
         if metadata.is_dir() {
             return Err(ReadError::Directory { path: path.to_path_buf() });
         }
-        let mut magic = Vec::with_capacity(4);
-        (&mut file).take(4).read_to_end(&mut magic).map_err(io)?;
-        if magic == *b"PAR1" {
-            return parquet::read(file, path);
-        }
-        refuse_other_kinds(&magic, path)?;
-        let size = metadata.is_file().then_some(metadata.len());
-        csv::read(Cursor::new(magic).chain(file), size, path)
+        let mut head = Vec::with_capacity(16);
+        (&mut file).take(HEAD).read_to_end(&mut head).map_err(io)?;
+        let mut recording = if head.starts_with(b"PAR1") {
+            parquet::read(file, naming, path)?
+        } else if arrays::is_mat_5(&head) || arrays::is_hdf5(&head) {
+            let mut bytes = head;
+            file.read_to_end(&mut bytes).map_err(io)?;
+            containers(bytes, naming, path)?
+        } else {
+            refuse_other_kinds(&head, path)?;
+            let size = metadata.is_file().then_some(metadata.len());
+            csv::read(Cursor::new(head).chain(file), size, naming, path)?
+        };
+        naming.scale(&mut recording);
+        Ok(recording)
+    }
+
+    /// Reads a recording that comes in one piece, as from standard input; `source` is the name that errors and warnings
+    /// give it. Parquet wants a file.
+    ///
+    /// # Errors
+    /// As [`Recording::read_named`].
+    pub fn read_from(mut reader: impl Read + Send, naming: &Naming, source: &Path) -> Result<Self, ReadError> {
+        let io = |error| ReadError::io(source, error);
+        let mut head = Vec::with_capacity(16);
+        (&mut reader).take(HEAD).read_to_end(&mut head).map_err(io)?;
+        let mut recording = if arrays::is_mat_5(&head) || arrays::is_hdf5(&head) {
+            let mut bytes = head;
+            reader.read_to_end(&mut bytes).map_err(io)?;
+            containers(bytes, naming, source)?
+        } else if head.starts_with(b"PAR1") {
+            let what = "is Parquet, which is read from its end".to_owned();
+            return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
+        } else {
+            refuse_other_kinds(&head, source)?;
+            csv::read(Cursor::new(head).chain(reader), None, naming, source)?
+        };
+        naming.scale(&mut recording);
+        Ok(recording)
     }
 
     /// Reads a recording from the bytes of a CSV file; `source` is the name that errors and warnings give it.
@@ -41,7 +83,15 @@ impl Recording {
     /// As [`Recording::read`].
     pub fn parse_csv(bytes: &[u8], source: &Path) -> Result<Self, ReadError> {
         refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
-        csv::read(bytes, Some(bytes.len() as u64), source)
+        csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
+    }
+}
+
+fn containers(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
+    if arrays::is_mat_5(&bytes) {
+        arrays::read_mat_5(&bytes, naming, source)
+    } else {
+        arrays::read_hdf5(bytes, naming, source)
     }
 }
 
@@ -58,7 +108,7 @@ fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {
         return refuse("is a zip archive or a spreadsheet");
     }
     if magic.starts_with(b"\x89HDF") {
-        return refuse("is HDF5 (or MATLAB 7.3)");
+        return refuse("begins like HDF5 and is none");
     }
     let is_named_parquet = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"));
     if is_named_parquet && !magic.is_empty() {

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::Recording;
 use super::error::ReadError;
+use super::naming::Naming;
 use manifest::{Manifest, Position};
 
 /// What kind of instrument was recorded.
@@ -110,26 +111,53 @@ impl Campaign {
     /// [`ReadError`]: the campaign file says something it cannot mean, or a recording is not there, is refused, lacks
     /// columns that its kind of run needs, or has no row left after settling.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let is_manifest = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-        if is_manifest { Self::open_manifest(path) } else { Self::of_one(path) }
+        Self::open_named(path, Naming::NONE)
     }
 
-    fn of_one(path: &Path) -> Result<Self, ReadError> {
-        let recording = Recording::read(path)?;
+    /// [`Campaign::open`] for recordings whose columns have names of their own.
+    ///
+    /// # Errors
+    /// As [`Campaign::open`], and where a mapped column is not there.
+    pub fn open_named(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
+        let is_manifest = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+        if is_manifest {
+            Self::open_manifest(path, naming)
+        } else {
+            Self::of_recordings(vec![Recording::read_named(path, naming)?])
+        }
+    }
+
+    /// A campaign of rotation runs that has no campaign file: all are fitted to, none is given a time to settle. It is
+    /// named after its recording, or after the folder that several lie in.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumns`] where a recording is none of a rotation.
+    pub fn of_recordings(recordings: Vec<Recording>) -> Result<Self, ReadError> {
+        let sources: Vec<PathBuf> = recordings.iter().map(|r| r.source.clone()).collect();
+        let name = match sources.as_slice() {
+            [one] => one.file_stem(),
+            [first, ..] => first.parent().and_then(Path::file_name),
+            [] => None,
+        };
+        let device = name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_else(|| "recordings".to_owned());
+        let runs = recordings.into_iter().map(Self::rotation).collect::<Result<_, _>>()?;
+        Ok(Self { source: sources.into_iter().next().unwrap_or_default(), device, runs, ..Self::default() })
+    }
+
+    fn rotation(recording: Recording) -> Result<Run, ReadError> {
+        let path = recording.source.clone();
         recording.require_rotation()?;
-        let run = Run {
+        Ok(Run {
             kind: RunKind::Rotation,
             file: path.file_name().map(PathBuf::from).unwrap_or_default(),
             settle_s: 0.0,
             role: Role::Fit,
             amplitude: None,
             recording,
-        };
-        let device = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Self { source: path.to_path_buf(), device, runs: vec![run], ..Self::default() })
+        })
     }
 
-    fn open_manifest(path: &Path) -> Result<Self, ReadError> {
+    fn open_manifest(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
         let io = |error| ReadError::io(path, error);
         if std::fs::metadata(path).map_err(io)?.is_dir() {
             return Err(ReadError::Directory { path: path.to_path_buf() });
@@ -140,7 +168,8 @@ impl Campaign {
         let mut warnings = manifest.warnings.clone();
         for entry in &manifest.runs {
             let file = folder.join(&entry.file);
-            let recording = Recording::read(&file).map_err(|error| explain(error, path, &entry.file, entry.at))?;
+            let recording =
+                Recording::read_named(&file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
             match entry.kind {
                 RunKind::Rotation => recording.require_rotation()?,
                 RunKind::Ringdown { .. } => recording.require_ringdown()?,

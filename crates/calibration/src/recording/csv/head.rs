@@ -8,9 +8,9 @@ use std::path::Path;
 
 use super::blocks::LONGEST_LINE;
 use super::record::{Record, Records};
-use crate::recording::channel::Channel;
 use crate::recording::error::ReadError;
 use crate::recording::layout::Layout;
+use crate::recording::naming::Naming;
 
 const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 
@@ -28,7 +28,7 @@ pub(super) struct Head {
 }
 
 /// Reads the head of a file.
-pub(super) fn read(reader: &mut impl BufRead, source: &Path) -> Result<Head, ReadError> {
+pub(super) fn read(reader: &mut impl BufRead, naming: &Naming, source: &Path) -> Result<Head, ReadError> {
     let mut comment: Option<(u64, Vec<u8>)> = None;
     let mut told_separator = None;
     let mut raw = vec![];
@@ -61,19 +61,21 @@ pub(super) fn read(reader: &mut impl BufRead, source: &Path) -> Result<Head, Rea
         if text.is_empty() {
             continue;
         }
-        if let Some((comment_line, names)) = comment.filter(|(_, names)| is_header_of(names, text, told_separator)) {
-            let mut head = understand(&names, comment_line, told_separator, source)?;
+        if let Some((comment_line, names)) =
+            comment.filter(|(_, names)| is_header_of(names, text, told_separator, naming))
+        {
+            let mut head = understand(&names, comment_line, told_separator, naming, source)?;
             (head.next_line, head.read_ahead) = (line, raw[start..].to_vec());
             return Ok(head);
         }
-        return understand(&raw[start..], line, told_separator, source);
+        return understand(&raw[start..], line, told_separator, naming, source);
     }
     Err(ReadError::Empty { path: source.to_path_buf() })
 }
 
 /// Whether a comment names channels above a line that does not.
-fn is_header_of(comment: &[u8], line: &[u8], told: Option<u8>) -> bool {
-    let channels = |text: &[u8]| candidates(told).map(|separator| known(text, separator)).max().unwrap_or(0);
+fn is_header_of(comment: &[u8], line: &[u8], told: Option<u8>, naming: &Naming) -> bool {
+    let channels = |text: &[u8]| candidates(told).map(|separator| known(text, separator, naming)).max().unwrap_or(0);
     channels(comment) > 0 && channels(line) == 0
 }
 
@@ -89,13 +91,13 @@ fn split(text: &[u8], separator: u8) -> Option<Record> {
 }
 
 /// How many channels a header names if this is its separator. It is not, if it leaves a quote within a field.
-fn known(text: &[u8], separator: u8) -> usize {
+fn known(text: &[u8], separator: u8, naming: &Naming) -> usize {
     let record = split(text, separator).filter(|record| !record.has_stray_quote).unwrap_or_default();
-    let is_channel = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|name| Channel::of(name).is_some());
+    let is_channel = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|name| naming.channel(name).is_some());
     record.fields().filter(is_channel).count()
 }
 
-fn understand(text: &[u8], line: u64, told: Option<u8>, source: &Path) -> Result<Head, ReadError> {
+fn understand(text: &[u8], line: u64, told: Option<u8>, naming: &Naming, source: &Path) -> Result<Head, ReadError> {
     let refuse = |what: String, wanted| Err(ReadError::Header { path: source.to_path_buf(), line, what, wanted });
     if text.trim_ascii().contains(&b'\r') {
         return refuse("the header holds carriage returns".to_owned(), "lines that end with LF or CRLF");
@@ -106,7 +108,7 @@ fn understand(text: &[u8], line: u64, told: Option<u8>, source: &Path) -> Result
     }
     let fields = |separator: u8| text.iter().filter(|&&byte| byte == separator).count();
     let separator =
-        candidates(told).max_by_key(|&separator| (known(text, separator), fields(separator))).unwrap_or(b',');
+        candidates(told).max_by_key(|&separator| (known(text, separator, naming), fields(separator))).unwrap_or(b',');
     let Some(record) = split(text, separator).filter(|_| text.iter().filter(|&&byte| byte == b'"').count() % 2 == 0)
     else {
         return refuse(
@@ -119,6 +121,6 @@ fn understand(text: &[u8], line: u64, told: Option<u8>, source: &Path) -> Result
     if names.iter().all(is_number) {
         return refuse("the first line holds numbers".to_owned(), "a header line with the column names above them");
     }
-    let layout = Layout::new(&names, source)?;
+    let layout = Layout::new(&names, naming, source)?;
     Ok(Head { layout, separator, header_line: line, next_line: line + 1, read_ahead: vec![] })
 }

@@ -26,6 +26,7 @@ use self::record::{Record, RecordError, Records};
 use super::Recording;
 use super::admission;
 use super::error::ReadError;
+use super::naming::Naming;
 use super::table::Table;
 
 /// How much text is taken at a time.
@@ -42,8 +43,13 @@ struct Sizes {
 const SIZES: Sizes = Sizes { block: 4 << 20, piece: 256 << 10, records: 16 << 10 };
 
 /// Reads a recording; `size` is the number of bytes, where it is known.
-pub(super) fn read(reader: impl Read + Send, size: Option<u64>, source: &Path) -> Result<Recording, ReadError> {
-    admission::admit(read_table(reader, size, source, SIZES)?, source)
+pub(super) fn read(
+    reader: impl Read + Send,
+    size: Option<u64>,
+    naming: &Naming,
+    source: &Path,
+) -> Result<Recording, ReadError> {
+    admission::admit(read_table(reader, size, naming, source, SIZES)?, source)
 }
 
 /// A block and the pieces it is cut into.
@@ -82,9 +88,15 @@ impl Batch {
     }
 }
 
-fn read_table(reader: impl Read + Send, size: Option<u64>, source: &Path, sizes: Sizes) -> Result<Table, ReadError> {
+fn read_table(
+    reader: impl Read + Send,
+    size: Option<u64>,
+    naming: &Naming,
+    source: &Path,
+    sizes: Sizes,
+) -> Result<Table, ReadError> {
     let mut reader = BufReader::new(reader);
-    let mut head = head::read(&mut reader, source)?;
+    let mut head = head::read(&mut reader, naming, source)?;
     let mut blocks = Blocks::new(Cursor::new(std::mem::take(&mut head.read_ahead)).chain(reader), sizes.block);
     let mut dialect = Dialect { layout: &head.layout, separator: head.separator, decimal: Decimal::Point };
 
@@ -164,7 +176,9 @@ fn read_records(
         let mut failed = None;
         while piece.rows < sizes.records && piece.fault.is_none() {
             match records.read(&mut record) {
-                Ok(true) if record.is_blank => piece.add_blank(record.line - assembly.next_line()),
+                Ok(true) if record.is_blank || plain::is_comment(dialect, record.fields().next()) => {
+                    piece.add_blank(record.line - assembly.next_line())
+                }
                 Ok(true) => {
                     piece.add(dialect, record.fields(), record.line - assembly.next_line(), record.is_terminated);
                 }

@@ -97,7 +97,17 @@ fn exact_row(dialect: &Dialect<'_>, line: &[u8], number: u64, is_terminated: boo
         return;
     }
     let fields = line.split(|&byte| byte == separator).map(cell::trim);
+    if is_comment(dialect, fields.clone().next()) {
+        piece.add_blank(number);
+        return;
+    }
     piece.add(dialect, fields, number, is_terminated);
+}
+
+/// Whether a line is a remark among the rows: it begins with `#` or `%` where a number should be.
+pub(super) fn is_comment(dialect: &Dialect<'_>, first: Option<&[u8]>) -> bool {
+    let wants_number = matches!(dialect.layout.fields.first(), Some(Field::Number(_)));
+    wants_number && first.is_some_and(|cell| matches!(cell.first(), Some(b'#' | b'%')))
 }
 
 /// The decimal mark of a row, if the row tells it: the first mark in a cell of numbers.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::*;
 
 fn table(text: &[u8], sizes: Sizes) -> Result<String, String> {
-    let table = read_table(text, Some(text.len() as u64), Path::new("a.csv"), sizes);
+    let table = read_table(text, Some(text.len() as u64), Naming::NONE, Path::new("a.csv"), sizes);
     // NaN is not equal to itself: the columns are compared as they print.
     table
         .map(|table| format!("{:?}", (table.numbers, table.unknown, table.rows, table.places, table.truncated)))

@@ -15,23 +15,23 @@ use parquet::schema::types::ColumnDescPtr;
 
 use crate::recording::Recording;
 use crate::recording::admission;
-use crate::recording::channel::Channel;
 use crate::recording::error::{Place, ReadError};
 use crate::recording::layout::{Field, Layout};
+use crate::recording::naming::Naming;
 use crate::recording::table::{Missing, Places, Table};
 use crate::recording::unknown::Cells;
 
 const BATCH_ROWS: usize = 64 << 10;
 
 /// Reads a recording.
-pub(in crate::recording) fn read(file: File, source: &Path) -> Result<Recording, ReadError> {
+pub(in crate::recording) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     // The decoder asserts what a damaged file does not hold.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode(file, source)));
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode(file, naming, source)));
     let damaged = |_| ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };
     admission::admit(decoded.map_err(damaged)??, source)
 }
 
-fn decode(file: File, source: &Path) -> Result<Table, ReadError> {
+fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError> {
     let refuse = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
     let reader = SerializedFileReader::new(file).map_err(|error| refuse(error.to_string()))?;
     let descriptions = reader.metadata().file_metadata().schema_descr_ptr();
@@ -40,7 +40,7 @@ fn decode(file: File, source: &Path) -> Result<Table, ReadError> {
     let mut names: Vec<&str> = vec![];
     for (at, description) in descriptions.columns().iter().enumerate() {
         let name = description.path().parts().first().map_or("", String::as_str);
-        let is_channel = Channel::of(name).is_some();
+        let is_channel = naming.channel(name).is_some();
         match unreadable(description, is_channel) {
             None => {
                 kept.push(at);
@@ -50,7 +50,7 @@ fn decode(file: File, source: &Path) -> Result<Table, ReadError> {
             Some(why) => warnings.push(format!("column `{}` {why} and is left out", description.path().string())),
         }
     }
-    let layout = Layout::new(&names, source)?;
+    let layout = Layout::new(&names, naming, source)?;
     let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
     table.warnings = warnings;
     refuse_codecs(&reader, &kept, source)?;

@@ -1,0 +1,135 @@
+//! Recordings as other people's instruments write them: names of their own, remarks among the rows, MATLAB and HDF5.
+
+#![allow(clippy::unwrap_used)]
+
+use std::io::Write as _;
+use std::path::Path;
+
+use cvg_calibration::recording::{Campaign, Naming, ReadError, Recording};
+
+fn naming(entries: &[&str]) -> Naming {
+    let mut naming = Naming::default();
+    entries.iter().for_each(|e| naming.add(e).unwrap());
+    naming
+}
+
+fn read(text: &str, entries: &[&str]) -> Result<Recording, ReadError> {
+    Recording::read_from(text.as_bytes(), &naming(entries), Path::new("-"))
+}
+
+const LOCK_IN: &str = "% LabTool 3.1\n% demod 0 and 1\nTime (ms);Ch1;Ch2;Table;Note\n0;1,0;0,0;0;a\n% range changed\n\
+                       10;0,9;0,1;5;b\n20;0,8;0,2;10;c\n";
+
+#[test]
+fn a_lock_ins_export_is_read_with_its_names_mapped() {
+    let entries = ["t_s=time (ms)*0.001", "xc_v=Ch1", "yc_v=Ch2", "table_deg=Table"];
+    let recording = read(LOCK_IN, &entries).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.01, 0.02]);
+    assert_eq!(recording.xc_v.as_deref(), Some(&[1.0, 0.9, 0.8][..]));
+    assert_eq!(recording.table_deg.as_deref(), Some(&[0.0, 5.0, 10.0][..]));
+    assert_eq!(recording.dropped.blank_lines.count, 1, "the remark among the rows");
+    assert_eq!(recording.unknown[0].name, "Note");
+    assert!(recording.require_rotation().is_ok());
+}
+
+#[test]
+fn a_remark_does_not_move_the_lines_that_errors_name() {
+    let text = "t_s,theta_deg\n0,1\n# pause\n0.1,x\n";
+    assert!(read(text, &[]).unwrap_err().to_string().contains("line 4, column 2"));
+}
+
+#[test]
+fn remarks_are_seen_among_quoted_rows_too() {
+    let text = "t_s,theta_deg,note\n0,1,\"a,b\"\n# pause\n0.1,2,c\n";
+    assert_eq!(read(text, &[]).unwrap().t_s, [0.0, 0.1]);
+}
+
+#[test]
+fn a_row_of_text_is_no_remark() {
+    let text = "note,t_s,theta_deg\n#1,0,1\n#2,0.1,2\n";
+    assert_eq!(read(text, &[]).unwrap().t_s, [0.0, 0.1]);
+}
+
+#[test]
+fn a_mapped_column_that_is_not_there_is_named_with_those_that_are() {
+    let error = read(LOCK_IN, &["t_s=Time (ms)", "xc_v=Ch1", "yc_v=Ch2", "temp_c=Ch9"]).unwrap_err().to_string();
+    assert!(error.contains("`temp_c` is mapped to a column `Ch9`") && error.contains("`Note`"), "{error}");
+}
+
+/// One array of a MATLAB 5 file: real doubles, column by column.
+fn matrix(name: &str, size: [u32; 2], values: &[f64]) -> Vec<u8> {
+    let element = |kind: u32, bytes: &[u8]| {
+        let mut out = [kind.to_le_bytes(), u32::try_from(bytes.len()).unwrap().to_le_bytes()].concat();
+        out.extend_from_slice(bytes);
+        out.resize(out.len().next_multiple_of(8), 0);
+        out
+    };
+    let flags = [6u32.to_le_bytes(), 0u32.to_le_bytes()].concat();
+    let size = size.map(u32::to_le_bytes).concat();
+    let values: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    element(14, &[element(6, &flags), element(5, &size), element(1, name.as_bytes()), element(9, &values)].concat())
+}
+
+fn mat_5(arrays: &[Vec<u8>]) -> Vec<u8> {
+    let mut file = format!("{:124}", "MATLAB 5.0 MAT-file, by a test").into_bytes();
+    file.extend_from_slice(&[0x00, 0x01, b'I', b'M']);
+    file.extend(arrays.concat());
+    file
+}
+
+#[test]
+fn a_matlab_file_is_read_by_its_arrays() {
+    let bytes = mat_5(&[
+        matrix("t_s", [3, 1], &[0.0, 0.1, 0.2]),
+        matrix("rate_dps", [1, 3], &[5.0, 5.0, 5.0]),
+        matrix("iq", [3, 2], &[1.0, 0.9, 0.8, 0.0, 0.1, 0.2]),
+        matrix("fs", [1, 1], &[10.0]),
+    ]);
+    let mapped = naming(&["xc_v=iq(:,1)", "yc_v=iq(:,2)"]);
+    let recording = Recording::read_from(bytes.as_slice(), &mapped, Path::new("a.mat")).unwrap();
+    assert_eq!(recording.xc_v.as_deref(), Some(&[1.0, 0.9, 0.8][..]));
+    assert_eq!(recording.yc_v.as_deref(), Some(&[0.0, 0.1, 0.2][..]));
+    assert!(recording.require_rotation().is_ok());
+    assert!(recording.warnings.iter().any(|w| w.contains("`fs` has 1 values, the time 3")), "{:?}", recording.warnings);
+
+    let mut file = tempfile::Builder::new().suffix(".mat").tempfile().unwrap();
+    file.write_all(&bytes).unwrap();
+    assert_eq!(Recording::read_named(file.path(), &mapped).unwrap().t_s, recording.t_s);
+}
+
+fn hdf5() -> Vec<u8> {
+    let mut file = hdf5_pure::FileBuilder::new();
+    file.create_dataset("t_s").with_f64_data(&[0.0, 0.1, 0.2]);
+    file.create_dataset("theta").with_f32_data(&[0.0, 10.0, 20.0]);
+    file.create_dataset("rate_dps").with_i32_data(&[100, 100, 100]);
+    file.finish().unwrap()
+}
+
+#[test]
+fn an_hdf5_file_is_read_by_its_datasets() {
+    let recording = Recording::read_from(hdf5().as_slice(), &naming(&["theta_deg=theta"]), Path::new("a.h5")).unwrap();
+    assert_eq!(recording.theta_deg.as_deref(), Some(&[0.0, 10.0, 20.0][..]));
+    assert_eq!(recording.rate_dps.as_deref(), Some(&[100.0; 3][..]));
+    assert!(recording.require_rotation().is_ok());
+}
+
+#[test]
+fn damaged_containers_are_refused_with_their_name() {
+    for bytes in [hdf5(), mat_5(&[matrix("t_s", [3, 1], &[0.0, 0.1, 0.2])])] {
+        for cut in (16..bytes.len()).step_by(7) {
+            let read = Recording::read_from(&bytes[..cut], Naming::NONE, Path::new("cut.bin"));
+            assert!(read.is_err_and(|e| e.to_string().starts_with("cut.bin: ")), "cut at {cut}");
+        }
+    }
+}
+
+#[test]
+fn recordings_of_one_folder_are_a_campaign_named_after_it() {
+    let recording = |name: &str| {
+        let text = "t_s,rate_dps,theta_deg\n0,100,0\n0.1,100,8\n";
+        Recording::parse_csv(text.as_bytes(), &Path::new("dfp-7").join(name)).unwrap()
+    };
+    let campaign = Campaign::of_recordings(vec![recording("a.csv"), recording("b.csv")]).unwrap();
+    assert_eq!((campaign.device.as_str(), campaign.runs.len()), ("dfp-7", 2));
+    assert_eq!(Campaign::of_recordings(vec![recording("a.csv")]).unwrap().device, "a");
+}

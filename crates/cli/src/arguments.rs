@@ -1,0 +1,173 @@
+//! The command line: commands, options, help with examples.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
+use cvg_calibration::recording::Naming;
+
+/// Find, explain and remove the angle errors of whole-angle gyroscopes and sin/cos sensors.
+#[derive(Parser)]
+#[command(name = "cvg", version, about, after_help = EXAMPLES)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cvg demo                                          the paper's device, simulated, identified, compensated
+  cvg inspect rot+500.csv                           what is in a file, and what is wrong with it
+  cvg identify campaign.toml --out results          the main job: report.html, report.json, calibration.toml
+  cvg identify rot+500.csv --out results            one recording is a campaign of one run
+  cvg compensate results/calibration.toml rot.csv --out rot-compensated.csv
+  cvg simulate scenario.toml --out bench            a campaign, and what it was set to
+
+Exit status: 0 done, 1 the data does not allow an answer, 2 bad use or bad input.";
+
+const IDENTIFY: &str = "\
+Examples:
+  cvg identify campaign.toml --out results
+  cvg identify 'rot*.csv' --out results             several recordings are a campaign of rotations
+  cvg identify rot+500.csv rot-500.csv --holdout rot+350.csv --settle 1
+  cvg identify export.csv --map t_s=Time --map theta_deg=Ch3 --map rate_dps=Table
+  cvg identify export.csv --map 't_s=Time (ms)*0.001' --map xc_v=Ch1 --map yc_v=Ch2 --map table_deg=Pos
+  gunzip -c rot.csv.gz | cvg identify - --json";
+
+const INSPECT: &str = "\
+Examples:
+  cvg inspect rot+500.csv
+  cvg inspect export.mat --map t_s=time --map 'xc_v=iq(:,1)' --map 'yc_v=iq(:,2)'
+  cvg inspect rot.csv --plot rot.svg
+  cvg inspect *.csv --json";
+
+const COMPENSATE: &str = "\
+Examples:
+  cvg compensate results/calibration.toml rot.csv --out clean.csv
+  cvg compensate results/calibration.toml rot.parquet --out clean.parquet
+  cvg compensate results/calibration.toml - --out clean.csv < rot.csv";
+
+const COMPLETIONS: &str = "\
+Examples:
+  cvg completions bash > ~/.local/share/bash-completion/completions/cvg
+  cvg completions zsh > ~/.zfunc/_cvg
+  cvg completions fish > ~/.config/fish/completions/cvg.fish";
+
+/// What the columns of foreign files mean.
+#[derive(Args, Clone, Default)]
+pub(crate) struct Mapping {
+    /// Which column is which channel, for files with names of their own; a factor takes its unit to the channel's
+    #[arg(long = "map", value_name = "CHANNEL=COLUMN[*FACTOR]")]
+    entries: Vec<String>,
+}
+
+impl Mapping {
+    /// The names, or what is wrong with them.
+    pub(crate) fn naming(&self) -> Result<Naming, crate::Failure> {
+        let mut naming = Naming::default();
+        for entry in &self.entries {
+            naming.add(entry).map_err(|e| crate::Failure::input(format!("--map: {e}")))?;
+        }
+        Ok(naming)
+    }
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// The paper's device end to end: simulate, identify, compensate, report
+    Demo {
+        /// Folder for campaign and results
+        #[arg(long, default_value = "cvg-demo")]
+        out: PathBuf,
+        /// Print report.json and nothing else to standard output
+        #[arg(long)]
+        json: bool,
+    },
+    /// Simulate a scenario: a campaign of recordings, and what it was set to
+    Simulate {
+        /// Scenario file (TOML)
+        scenario: PathBuf,
+        /// Folder for the campaign
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Say what is in recordings or a campaign, and what is wrong with it
+    #[command(after_help = INSPECT)]
+    Inspect {
+        /// campaign.toml or recordings (CSV, Parquet, .mat, HDF5); patterns like 'rot*.csv'; - for standard input
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        #[command(flatten)]
+        mapping: Mapping,
+        /// Draw the columns of the first recording over time into this file (.svg or .png)
+        #[arg(long)]
+        plot: Option<PathBuf>,
+        /// Print the facts as JSON and nothing else to standard output
+        #[arg(long)]
+        json: bool,
+    },
+    /// Identify the instrument of a campaign: what is wrong with it, and the error before and after
+    #[command(after_help = IDENTIFY)]
+    Identify {
+        /// campaign.toml, or recordings of rotations (CSV, Parquet, .mat, HDF5); patterns like 'rot*.csv'; - for standard
+        /// input
+        #[arg(required = true, value_name = "CAMPAIGN")]
+        campaign: Vec<PathBuf>,
+        /// Folder for report.json, report.html and calibration.toml; without it only the summary is printed
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Print report.json and nothing else to standard output
+        #[arg(long)]
+        json: bool,
+        #[command(flatten)]
+        mapping: Mapping,
+        /// A further recording that nothing is fitted to; without one the last quarter of each is held out
+        #[arg(long, value_name = "RECORDING")]
+        holdout: Vec<PathBuf>,
+        /// Seconds to drop at the start of each recording; a campaign.toml says that itself
+        #[arg(long, value_name = "SECONDS")]
+        settle: Option<f64>,
+    },
+    /// Take the identified errors out of a recording
+    #[command(after_help = COMPENSATE)]
+    Compensate {
+        /// calibration.toml from `cvg identify`
+        calibration: PathBuf,
+        /// Recording (CSV, Parquet, .mat, HDF5); - for standard input
+        recording: PathBuf,
+        /// File for the compensated recording (CSV, or Parquet where the name ends in .parquet)
+        #[arg(long)]
+        out: PathBuf,
+        #[command(flatten)]
+        mapping: Mapping,
+    },
+    /// The library of effects: what a recording can hold
+    Effects {
+        /// Show this one in full
+        effect: Option<String>,
+        /// Print the library as JSON
+        #[arg(long, conflicts_with = "markdown")]
+        json: bool,
+        /// Print the library as the page of the book
+        #[arg(long)]
+        markdown: bool,
+    },
+    /// Figures 2, 3 and 4 of the paper from our models, as SVG, PNG and CSV, and its numbers beside ours
+    Paper {
+        /// Folder for figures, data and table
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Print a completion script for a shell
+    #[command(after_help = COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Write the manual pages, cvg.1 and one for each command
+    Man {
+        /// Folder for them
+        #[arg(long)]
+        out: PathBuf,
+    },
+}

@@ -1,0 +1,102 @@
+//! Files as they are named on the command line: patterns, standard input, campaigns and loose recordings.
+
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::recording::{Campaign, Naming, ReadError, Recording, Role};
+
+use crate::Failure;
+
+/// What standard input is called in messages.
+const STANDARD_INPUT: &str = "standard input";
+
+/// Whether a name stands for standard input.
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+/// Reads a recording from a file, or from standard input for `-`.
+pub(crate) fn recording(path: &Path, naming: &Naming) -> Result<Recording, Failure> {
+    let read = if is_standard_input(path) {
+        Recording::read_from(std::io::stdin(), naming, Path::new(STANDARD_INPUT))
+    } else {
+        Recording::read_named(path, naming)
+    };
+    read.map_err(explained)
+}
+
+/// The files that names and patterns stand for. A name that exists is itself, whatever signs are in it.
+pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut out: Vec<PathBuf> = Vec::new();
+    for name in names {
+        let text = name.to_string_lossy();
+        if name.exists() || !text.contains(['*', '?', '[']) {
+            out.push(name.clone());
+            continue;
+        }
+        let bad = |what: String| Failure::input(format!("{text}: {what}"));
+        let found: Vec<PathBuf> = glob::glob(&text)
+            .map_err(|e| bad(format!("is no pattern: {e}")))?
+            .collect::<Result<_, _>>()
+            .map_err(|e| bad(e.to_string()))?;
+        if found.is_empty() {
+            return Err(bad("no file has a name like this".into()));
+        }
+        out.extend(found);
+    }
+    if out.iter().filter(|p| is_standard_input(p)).count() > 1 {
+        return Err(Failure::input("standard input can be read only once"));
+    }
+    if let Some(twice) = (1..out.len()).find(|&i| out[..i].contains(&out[i])) {
+        return Err(Failure::input(format!("{}: is named twice", out[twice].display())));
+    }
+    Ok(out)
+}
+
+/// Whether a file is a campaign by its name.
+pub(crate) fn is_campaign(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}
+
+/// Opens a campaign file, or makes a campaign of recordings.
+pub(crate) fn campaign(
+    names: &[PathBuf],
+    naming: &Naming,
+    holdout: &[PathBuf],
+    settle_s: Option<f64>,
+) -> Result<Campaign, Failure> {
+    let (fitted, held) = (files(names)?, files(holdout)?);
+    if let Some(file) = fitted.iter().chain(&held).find(|p| is_campaign(p)) {
+        if fitted.len() > 1 || !held.is_empty() || settle_s.is_some() {
+            return Err(Failure::input(format!(
+                "{}: a campaign file stands alone and says itself what is held out and how long to settle",
+                file.display()
+            )));
+        }
+        return Campaign::open_named(file, naming).map_err(explained);
+    }
+    if let Some(file) = held.iter().find(|p| fitted.contains(p)) {
+        return Err(Failure::input(format!("{}: cannot be fitted to and held out at once", file.display())));
+    }
+    let settle_s = settle_s.unwrap_or(0.0);
+    if !settle_s.is_finite() || settle_s < 0.0 {
+        return Err(Failure::input(format!("--settle {settle_s}: wanted zero or more seconds")));
+    }
+    let read: Vec<Recording> =
+        fitted.iter().chain(&held).map(|path| recording(path, naming)).collect::<Result<_, _>>()?;
+    let mut campaign = Campaign::of_recordings(read).map_err(explained)?;
+    for (number, run) in campaign.runs.iter_mut().enumerate() {
+        run.settle_s = settle_s;
+        if number >= fitted.len() {
+            run.role = Role::Holdout;
+        }
+        run.settled()?;
+    }
+    Ok(campaign)
+}
+
+/// What would mend it, where the command line can.
+pub(crate) fn explained(error: ReadError) -> Failure {
+    let foreign = matches!(error, ReadError::MissingColumns { .. } | ReadError::MappedColumn { .. });
+    let hint = if foreign { "; columns with other names are mapped, as in --map theta_deg=Ch3" } else { "" };
+    Failure::input(format!("{error}{hint}"))
+}

@@ -1,0 +1,201 @@
+//! `cvg inspect`: what is in a file, and what is wrong with it.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::recording::{Campaign, Channel, Naming, Recording, RunKind};
+use serde_json::{Value, json};
+
+use crate::figure::{BLUE, GREEN, PURPLE, Series, VERMILLION, plot, plot_png};
+use crate::{Failure, input, output};
+
+/// Characters of a column's small picture.
+const SMALL: usize = 40;
+/// Points of a plotted column.
+const POINTS: usize = 2000;
+
+/// Inspects files one after the other.
+pub(crate) fn inspect(
+    names: &[PathBuf],
+    naming: &Naming,
+    plotted: Option<&Path>,
+    as_json: bool,
+) -> Result<(), Failure> {
+    let mut facts: Vec<Value> = Vec::new();
+    let mut drawn = false;
+    for file in input::files(names)? {
+        let recordings = if input::is_campaign(&file) {
+            let campaign = Campaign::open_named(&file, naming).map_err(input::explained)?;
+            if !as_json {
+                println!("{}: {}, {} runs", file.display(), campaign.device, campaign.runs.len());
+                for w in &campaign.warnings {
+                    println!("  warning: {w}");
+                }
+            }
+            campaign.runs.into_iter().map(|run| (Some(run.kind), run.recording)).collect()
+        } else {
+            vec![(None, input::recording(&file, naming)?)]
+        };
+        for (kind, recording) in recordings {
+            if let Some(path) = plotted.filter(|_| !drawn) {
+                draw(&recording, path)?;
+                drawn = true;
+            }
+            if as_json {
+                facts.push(as_value(&recording));
+            } else {
+                print!("{}", in_words(&recording, kind));
+            }
+        }
+    }
+    if as_json {
+        println!("{}", serde_json::to_string_pretty(&facts).map_err(Failure::input)?);
+    }
+    Ok(())
+}
+
+/// A channel in numbers.
+struct Summary {
+    channel: Channel,
+    missing: usize,
+    low: f64,
+    mean: f64,
+    high: f64,
+    small: String,
+}
+
+fn summaries(recording: &Recording) -> Vec<Summary> {
+    let channels = Channel::ALL.into_iter().filter(|c| *c != Channel::Time);
+    channels.filter_map(|c| recording.channel(c).map(|v| summary(c, v))).collect()
+}
+
+fn summary(channel: Channel, values: &[f64]) -> Summary {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let count = finite().count();
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let bar = |part: &[f64]| {
+        let mean = part.iter().sum::<f64>() / part.len() as f64;
+        let share = if high > low { (mean - low) / (high - low) } else { 0.5 };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of eight bars")]
+        let at = (share * 7.99) as usize;
+        BARS[at.min(7)]
+    };
+    let small = values.chunks(values.len().div_ceil(SMALL).max(1)).map(bar).collect();
+    Summary {
+        channel,
+        missing: values.len() - count,
+        low,
+        mean: finite().sum::<f64>() / count.max(1) as f64,
+        high,
+        small,
+    }
+}
+
+/// Duration, median interval and largest interval, s.
+fn timing(t: &[f64]) -> (f64, f64, f64) {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let middle = steps.get(steps.len() / 2).copied().unwrap_or(f64::NAN);
+    let largest = steps.last().copied().unwrap_or(f64::NAN);
+    (t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0), middle, largest)
+}
+
+/// What a recording serves for, or what it lacks.
+fn uses(recording: &Recording) -> Vec<String> {
+    let say = |kind: &str, asked: Result<(), cvg_calibration::recording::ReadError>| match asked {
+        Ok(()) => format!("serves as {kind}"),
+        Err(_) => format!("does not serve as {kind}"),
+    };
+    let mut out =
+        vec![say("a rotation", recording.require_rotation()), say("a ring-down", recording.require_ringdown())];
+    if recording.vas_v.is_none() || recording.vqc_v.is_none() {
+        out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
+    }
+    out
+}
+
+fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
+    let mut s = String::new();
+    let mut line = |text: String| {
+        let _ = writeln!(s, "{text}");
+    };
+    let d = &recording.dropped;
+    let (duration, interval, largest) = timing(&recording.t_s);
+    let kind = kind.map_or("", |k| if k == RunKind::Rotation { ", a rotation" } else { ", a ring-down" });
+    line(format!("{}{kind}", recording.source.display()));
+    line(format!(
+        "  {} rows over {duration:.3} s, one every {:.6} s ({:.2} Hz), largest gap {largest:.6} s; {} rows dropped",
+        recording.len(),
+        interval,
+        1.0 / interval,
+        d.rows_dropped()
+    ));
+    line(format!("  {:<10}{:>14}{:>14}{:>14}{:>9}  over time", "column", "smallest", "mean", "largest", "missing"));
+    for x in summaries(recording) {
+        line(format!(
+            "  {:<10}{:>14.6}{:>14.6}{:>14.6}{:>9}  {}",
+            x.channel.name(),
+            x.low,
+            x.mean,
+            x.high,
+            x.missing,
+            x.small
+        ));
+    }
+    for u in uses(recording) {
+        line(format!("  {u}"));
+    }
+    if recording.warnings.is_empty() {
+        line("  nothing is wrong with it".into());
+    }
+    for w in &recording.warnings {
+        line(format!("  warning: {w}"));
+    }
+    s
+}
+
+fn as_value(recording: &Recording) -> Value {
+    let (duration_s, interval_s, largest_interval_s) = timing(&recording.t_s);
+    let columns: Vec<Value> = summaries(recording)
+        .iter()
+        .map(|x| {
+            json!({"name": x.channel.name(), "smallest": x.low, "mean": x.mean, "largest": x.high, "missing": x.missing})
+        })
+        .collect();
+    json!({
+        "file": recording.source.display().to_string(), "rows": recording.len(),
+        "rows_dropped": recording.dropped.rows_dropped(), "duration_s": duration_s, "interval_s": interval_s,
+        "largest_interval_s": largest_interval_s, "columns": columns,
+        "unknown_columns": recording.unknown.iter().map(|u| u.name.as_str()).collect::<Vec<_>>(),
+        "rotation": recording.require_rotation().is_ok(), "ringdown": recording.require_ringdown().is_ok(),
+        "warnings": recording.warnings,
+    })
+}
+
+/// The columns over time, each in its own span, so that one figure holds them.
+fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
+    let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high > x.low).collect();
+    let stride = recording.len().div_ceil(POINTS).max(1);
+    let names: Vec<String> =
+        shown.iter().map(|x| format!("{} ({:.4} to {:.4})", x.channel.name(), x.low, x.high)).collect();
+    let series: Vec<Series<'_>> = shown
+        .iter()
+        .zip(&names)
+        .zip([BLUE, VERMILLION, GREEN, PURPLE].into_iter().cycle())
+        .map(|((x, name), colour)| {
+            let values = recording.channel(x.channel).unwrap_or_default();
+            let unit = |v: f64| (v - x.low) / (x.high - x.low);
+            let points = recording.t_s.iter().zip(values).step_by(stride).filter(|(_, v)| v.is_finite());
+            Series { name, colour, points: points.map(|(t, v)| (*t, unit(*v))).collect(), joined: true }
+        })
+        .collect();
+    let (x, y) = ("time [s]", "share of each column's span");
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        plot_png(path, x, y, &series)?;
+    } else {
+        output::write(path, plot(x, y, &series)?.as_bytes())?;
+    }
+    eprintln!("wrote {}", path.display());
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! `cvg effects`: the library of effects, as its own descriptions tell it.
+
+use std::fmt::Write as _;
+
+use cvg_model::effects::{Description, EffectId, Role, Scaling};
+use serde_json::{Value, json};
+
+use crate::Failure;
+
+/// Prints the library, or one effect of it.
+pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) -> Result<(), Failure> {
+    let chosen: Vec<&Description> = match effect {
+        None => EffectId::ALL.iter().map(|e| e.description()).collect(),
+        Some(id) => vec![EffectId::from_id(id).ok_or_else(|| unknown(id))?.description()],
+    };
+    if as_json {
+        let all: Vec<Value> = chosen.iter().map(|d| facts(d)).collect();
+        println!("{}", serde_json::to_string_pretty(&all).map_err(Failure::input)?);
+    } else if as_markdown {
+        print!("{}", page());
+    } else if effect.is_some() {
+        chosen.iter().for_each(|d| print!("{}", in_full(d)));
+    } else {
+        for d in chosen {
+            println!("{:<25}{:<11}{}", d.id, stage(d), d.title);
+        }
+    }
+    Ok(())
+}
+
+fn unknown(id: &str) -> Failure {
+    let ids: Vec<&str> = EffectId::ALL.iter().map(|e| e.description().id).collect();
+    Failure::input(format!("the library has no effect `{id}`; it has {}", ids.join(", ")))
+}
+
+fn stage(d: &Description) -> String {
+    format!("{:?}", d.stage).to_lowercase()
+}
+
+fn origin(d: &Description) -> &'static str {
+    match (d.declared, d.empirical) {
+        (true, _) => "declared",
+        (false, true) => "empirical",
+        (false, false) => "discovered",
+    }
+}
+
+fn role(role: Role) -> &'static str {
+    match role {
+        Role::Fitted => "fitted",
+        Role::Refined => "held at its neutral value until the data asks for it",
+        Role::Searched(_) => "set by a search",
+    }
+}
+
+/// How the share in the angle scales, in words.
+fn scaling(s: Scaling) -> String {
+    let power = |of: &str, n: i8| match n {
+        0 => format!("independent of the {of}"),
+        1 => format!("∝ {of}"),
+        -1 => format!("∝ 1/{of}"),
+        n => format!("∝ {of}^{n}"),
+    };
+    let odd = if s.odd_in_rate { ", its sign follows the rate's" } else { "" };
+    format!("{}, {}{odd}", power("rate", s.rate), power("amplitude", s.amplitude))
+}
+
+fn facts(d: &Description) -> Value {
+    let parameters: Vec<Value> = d
+        .parameters
+        .iter()
+        .map(|p| {
+            json!({"name": p.name, "unit": p.unit, "lower": p.lower, "upper": p.upper, "neutral": p.neutral,
+                   "role": role(p.role)})
+        })
+        .collect();
+    json!({
+        "id": d.id, "title": d.title, "stage": stage(d), "origin": origin(d), "in_sensors": d.in_sensors,
+        "parameters": parameters, "signature": d.signature, "source": d.source,
+        "scaling": {"rate": d.scaling.rate, "amplitude": d.scaling.amplitude, "odd_in_rate": d.scaling.odd_in_rate},
+    })
+}
+
+fn in_full(d: &Description) -> String {
+    let mut s = format!("{}: {}\n", d.id, d.title);
+    let mut line = |what: &str, value: &str| {
+        let _ = writeln!(s, "  {what:<12}{value}");
+    };
+    line("acts in", &stage(d));
+    line("origin", origin(d));
+    line("signature", d.signature);
+    line("scaling", &scaling(d.scaling));
+    for p in d.parameters {
+        let bounds = format!("{} [{}], {} to {}, {}", p.name, p.unit, p.lower, p.upper, role(p.role));
+        line("parameter", &bounds);
+    }
+    line("in sensors", if d.in_sensors { "yes" } else { "no" });
+    line("source", d.source);
+    s
+}
+
+/// The page of the book.
+fn page() -> String {
+    let mut s = String::from(
+        "# Effects\n\nWhat a recording can hold. This page is printed by `cvg effects --markdown` from\n\
+         `crates/model/src/effects`, one file per effect; a test compares the two. `cvg effects ID` shows one in full.\n\n\
+         An effect acts in one of four stages: on the **input** rotation, in the **mechanics**, in the **actuation**, or in \
+         the\n**readout**. `a` is the amplitude, θ the pattern angle, α the angle of the table, k the angular gain, Ω the \
+         rate. Signatures\nare for small effects.\n\n\
+         | effect | stage | origin | parameters | signature | share in the angle |\n| --- | --- | --- | --- | --- | --- |\n",
+    );
+    for e in EffectId::ALL {
+        let d = e.description();
+        let parameters: Vec<String> = d.parameters.iter().map(|p| format!("`{}` [{}]", p.name, p.unit)).collect();
+        let cell = |text: &str| text.replace('|', "\\|");
+        let _ = writeln!(
+            s,
+            "| `{}` | {} | {} | {} | {} | {} |",
+            d.id,
+            stage(d),
+            origin(d),
+            parameters.join(", "),
+            cell(d.signature),
+            scaling(d.scaling)
+        );
+    }
+    s.push_str(LOOK_ALIKES);
+    s
+}
+
+const LOOK_ALIKES: &str = "
+*Declared* effects are the paper's model. *Discovered* ones are taken from the library where the residual asks for them.
+The *empirical* one describes what no physical effect explains, and claims no cause.
+
+## Look-alikes
+
+At one rate and one amplitude the following cannot be told apart:
+
+- `detection-gain-mismatch`, and the sine part of `anisodamping`;
+- `detection-skew`, and the cosine part of `anisodamping`;
+- `detection-cubic`, and `spring-cubic`;
+- the difference part of `detection-cubic`, and `detection-gain-mismatch`.
+
+What separates them is in [Prepare a campaign](campaigns.md). How an effect is added is in
+[Add an effect](adding-an-effect.md).
+";

@@ -1,0 +1,354 @@
+//! The figures of the page, as Plotly takes them. Colours are names that the page turns into those of its theme.
+
+use cvg_calibration::picture::{EffectSizes, Picture};
+use cvg_calibration::{BiasCurve, Identification};
+use cvg_model::effects::EffectId;
+use serde_json::{Value, json};
+
+/// One figure.
+pub(super) struct Figure {
+    pub(super) id: String,
+    pub(super) title: String,
+    /// what it shows and what to look for
+    pub(super) caption: String,
+    pub(super) wide: bool,
+    /// series that can be switched off: mark of the series, its label
+    pub(super) toggles: Vec<(String, String)>,
+    traces: Vec<Value>,
+    layout: Value,
+}
+
+impl Figure {
+    fn new(id: &str, title: &str, caption: impl Into<String>, traces: Vec<Value>, layout: Value) -> Self {
+        let (id, title, caption) = (id.into(), title.into(), caption.into());
+        Self { id, title, caption, wide: false, toggles: Vec::new(), traces, layout }
+    }
+
+    fn wide(self) -> Self {
+        Self { wide: true, ..self }
+    }
+
+    /// What the page's script draws.
+    pub(super) fn data(&self) -> Value {
+        json!({"id": self.id, "traces": self.traces, "layout": self.layout})
+    }
+}
+
+/// Markers of one stage in the figure of the bias.
+const BIAS_POINTS: usize = 1200;
+/// Ticks of an amplitude.
+const TICKS: [f64; 13] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 5.0, 10.0];
+/// Runs that the figure of the energy control can show.
+const DRIVES: usize = 3;
+/// Colours of runs, in turn.
+const INKS: [&str; 7] = ["@declared", "@raw", "@discovered", "@4", "@5", "@6", "@7"];
+
+/// Every figure that the identification has the data for.
+pub(super) fn all(identified: &Identification) -> Vec<Figure> {
+    let mut out = vec![bias(identified)];
+    let empty = Picture::default();
+    let picture = identified.picture.as_ref().unwrap_or(&empty);
+    out.extend(angle(picture));
+    out.extend(ring_downs(identified));
+    out.extend(drive(picture));
+    out.extend(harmonics(picture));
+    out.extend(picture.scaling.iter().filter_map(scaling));
+    out.extend(residual(picture));
+    out.extend(memory(picture));
+    out.extend(histogram(picture));
+    out.extend(correlations(picture));
+    out
+}
+
+/// A number with six significant digits: what a screen can show.
+fn short(value: f64) -> Value {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    json!(rounded)
+}
+
+fn shorts(values: impl IntoIterator<Item = f64>) -> Value {
+    values.into_iter().map(short).collect()
+}
+
+fn axis(title: &str) -> Value {
+    json!({"title": {"text": title}})
+}
+
+/// The file's name without its folder.
+pub(super) fn run_name(path: &str) -> String {
+    std::path::Path::new(path).file_name().map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())
+}
+
+fn bias(identified: &Identification) -> Figure {
+    let curves = &identified.figures.bias;
+    let total: usize = curves.iter().map(|c| c.pattern_deg.len()).sum();
+    let stride = total.div_ceil(BIAS_POINTS).max(1);
+    type Pick = fn(&BiasCurve) -> &Vec<f64>;
+    let stages: [(&str, &str, Pick); 3] = [
+        ("raw", "circle", |c| &c.raw_deg),
+        ("declared", "square", |c| &c.declared_deg),
+        ("discovered", "diamond", |c| &c.discovered_deg),
+    ];
+    let mut traces = Vec::new();
+    let mut toggles = Vec::new();
+    for (name, symbol, pick) in stages {
+        let points = || {
+            let all = curves.iter().flat_map(|c| {
+                let run = run_name(&c.name);
+                c.pattern_deg.iter().zip(pick(c)).map(move |(x, y)| (*x, *y, run.clone()))
+            });
+            all.step_by(stride)
+        };
+        if points().next().is_none() {
+            continue;
+        }
+        toggles.push((name.to_owned(), name.to_owned()));
+        traces.push(json!({
+            "type": "scatter", "mode": "markers", "name": name, "meta": name,
+            "x": shorts(points().map(|p| p.0)), "y": shorts(points().map(|p| p.1)),
+            "text": points().map(|p| p.2).collect::<Vec<_>>(),
+            "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8},
+            "hovertemplate": "%{x:.2f}°: %{y:.5f}°<br>%{text}",
+        }));
+    }
+    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("angle error [deg]"), "showlegend": false});
+    let caption = "Angle minus the best line on held-out data, before any compensation, after the paper's model, and \
+                   after all. Switch off a stage to enlarge the others.";
+    Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
+}
+
+fn angle(picture: &Picture) -> Option<Figure> {
+    let curve = picture.angles.first()?;
+    let t = shorts(curve.t_s.iter().copied());
+    let line = |name: &str, y: &[f64], axis: &str, ink: &str| {
+        json!({"type": "scatter", "mode": "lines", "name": name, "x": t, "y": shorts(y.iter().copied()),
+               "yaxis": axis, "line": {"color": ink, "width": 1.6}, "hovertemplate": "%{x:.4f} s: %{y:.3f}°"})
+    };
+    let traces = vec![
+        line("pattern angle", &curve.wrapped_deg, "y", "@declared"),
+        line("unwrapped", &curve.unwrapped_deg, "y2", "@raw"),
+    ];
+    let layout = json!({
+        "xaxis": axis("time [s]"), "yaxis": axis("pattern angle [deg]"),
+        "yaxis2": {"title": {"text": "unwrapped [deg]"}, "overlaying": "y", "side": "right", "showgrid": false},
+    });
+    let caption = format!("As recorded in {}, the first held-out turns of the pattern.", run_name(&curve.name));
+    Some(Figure::new("angle", "Pattern angle", caption, traces, layout))
+}
+
+fn ring_downs(identified: &Identification) -> Option<Figure> {
+    let downs = &identified.figures.ring_downs;
+    if downs.is_empty() {
+        return None;
+    }
+    let traces = downs.iter().zip(INKS.iter().cycle()).map(|(r, ink)| {
+        json!({
+            "type": "scatter", "mode": "lines", "line": {"color": ink, "width": 2},
+            // a rounded angle below zero is not to read −0
+            "name": format!("{:.0}°: τ = {:.4} ± {:.4} s", r.angle_rad.to_degrees().round() + 0.0, r.tau_s, 1.96 * r.tau_error_s),
+            "x": shorts(r.decay.iter().map(|p| p.0)), "y": shorts(r.decay.iter().map(|p| p.1)),
+            "hovertemplate": "%{x:.2f} s: %{y:.5f} V",
+        })
+    });
+    let layout = json!({
+        "xaxis": axis("time [s]"),
+        "yaxis": {"title": {"text": "amplitude [V]"}, "type": "log", "tickvals": TICKS},
+    });
+    let caption = "Amplitude with the pattern held, the energy loop on and then off. Straight lines are exponential \
+                   decays; their slope is the damping of that direction (run-down).";
+    Some(Figure::new("ringdowns", "Ring-downs", caption, traces.collect(), layout))
+}
+
+fn drive(picture: &Picture) -> Option<Figure> {
+    // the fastest run, the slowest, and those between
+    let mut drives: Vec<_> = picture.drives.iter().collect();
+    drives.sort_by(|a, b| b.rate_dps.abs().total_cmp(&a.rate_dps.abs()));
+    let last = drives.len().checked_sub(1)?;
+    let mut shown: Vec<usize> = [0, last, last / 2].into_iter().take(DRIVES).collect();
+    shown.dedup();
+    let mut traces = Vec::new();
+    for (number, d) in shown.into_iter().map(|at| drives[at]).enumerate() {
+        let visible = if number == 0 { json!(true) } else { json!("legendonly") };
+        let run = run_name(&d.name);
+        let stages = [("before", &d.before_v, "circle", "@raw"), ("after", &d.after_v, "diamond", "@discovered")];
+        for (stage, values, symbol, ink) in stages {
+            traces.push(json!({
+                "type": "scatter", "mode": "lines+markers", "name": format!("{run}, {stage}"), "visible": visible,
+                "x": shorts(d.pattern_deg.iter().copied()), "y": shorts(values.iter().copied()),
+                "marker": {"size": 5, "symbol": symbol}, "line": {"width": 1.5, "color": ink},
+                "hovertemplate": "%{x:.1f}°: %{y:.5f} V",
+            }));
+        }
+    }
+    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("energy control output v_as [V]")});
+    let caption = "As recorded, and what would hold the true amplitude with the identified electronics undone. What \
+                   still depends on the angle afterwards is damping. Other runs can be switched on in the legend.";
+    Some(Figure::new("drive", "Energy control over the pattern angle", caption, traces, layout).wide())
+}
+
+fn harmonics(picture: &Picture) -> Option<Figure> {
+    let any = picture.stages.iter().any(|(_, h)| !h.is_empty());
+    let traces = picture.stages.iter().map(|(name, list)| {
+        json!({
+            "type": "bar", "name": name, "marker": {"color": format!("@{name}")},
+            "x": list.iter().map(|h| format!("{}θ", h.n)).collect::<Vec<_>>(),
+            "y": shorts(list.iter().map(|h| h.amplitude_deg)),
+            "error_y": {"type": "data", "array": shorts(list.iter().map(|h| h.ci95_deg)), "color": "@muted", "width": 3},
+            "hovertemplate": "%{x}: %{y:.6f}°",
+        })
+    });
+    let layout = json!({
+        "barmode": "group", "xaxis": axis("harmonic of the pattern angle"),
+        "yaxis": {"title": {"text": "amplitude [deg]"}, "type": "log", "exponentformat": "power", "dtick": 1},
+    });
+    let caption =
+        "Of the held-out error, at each stage, with 95 % intervals. A bar no higher than its interval is noise.";
+    any.then(|| Figure::new("harmonics", "Harmonics", caption, traces.collect(), layout))
+}
+
+fn residual(picture: &Picture) -> Option<Figure> {
+    let traces: Vec<Value> = picture
+        .residuals
+        .iter()
+        .zip(INKS.iter().cycle())
+        .map(|(r, ink)| {
+            json!({
+                "type": "scatter", "mode": "lines", "name": run_name(&r.name), "line": {"width": 0.8, "color": ink},
+                "x": shorts(r.t_s.iter().copied()), "y": shorts(r.error_deg.iter().copied()),
+                "hovertemplate": "%{x:.3f} s: %{y:.5f}°",
+            })
+        })
+        .collect();
+    let layout = json!({"xaxis": axis("time [s]"), "yaxis": axis("angle error [deg]")});
+    let caption = "What is left on held-out data; of each stretch its smallest and its largest value. It should have no \
+                   shape.";
+    (!traces.is_empty()).then(|| Figure::new("residual", "Residual over time", caption, traces, layout).wide())
+}
+
+fn memory(picture: &Picture) -> Option<Figure> {
+    let m = &picture.memory;
+    let lags: Vec<usize> = (1..m.correlation.len()).collect();
+    if lags.is_empty() {
+        return None;
+    }
+    let end = lags.len() as f64 + 0.5;
+    let traces = vec![json!({
+        "type": "bar", "name": "autocorrelation", "x": lags, "y": shorts(m.correlation.iter().skip(1).copied()),
+        "marker": {"color": "@declared"}, "hovertemplate": "lag %{x}: %{y:.4f}",
+    })];
+    let layout = json!({
+        "xaxis": axis("lag [samples]"), "yaxis": axis("correlation"), "showlegend": false,
+        "shapes": [{"type": "rect", "x0": 0.5, "x1": end, "y0": -m.band99, "y1": m.band99, "fillcolor": "@band",
+                    "line": {"width": 1, "color": "@muted", "dash": "dot"}}],
+    });
+    let caption =
+        format!("Of the residual. White noise stays within the band, ± {:.4}, at 99 % of the lags.", m.band99);
+    Some(Figure::new("autocorrelation", "Autocorrelation", caption, traces, layout))
+}
+
+fn histogram(picture: &Picture) -> Option<Figure> {
+    let h = &picture.histogram;
+    if h.count.is_empty() {
+        return None;
+    }
+    let x = shorts(h.middle_deg.iter().copied());
+    let traces = vec![
+        json!({"type": "bar", "name": "residual", "x": x, "y": h.count, "marker": {"color": "@discovered"},
+               "hovertemplate": "%{x:.5f}°: %{y}"}),
+        json!({"type": "scatter", "mode": "lines", "name": "normal", "x": x, "y": shorts(h.normal.iter().copied()),
+               "line": {"color": "@raw", "width": 2}, "hovertemplate": "%{x:.5f}°: %{y:.1f}"}),
+    ];
+    let layout = json!({"bargap": 0, "xaxis": axis("angle error [deg]"), "yaxis": axis("samples")});
+    let caption = "Of the residual, beside a normal distribution of the same mean square.";
+    Some(Figure::new("histogram", "Distribution", caption, traces, layout))
+}
+
+/// Size of one effect over rate and over amplitude, each reduced by its own law to the other's middle.
+fn scaling(sizes: &EffectSizes) -> Option<Figure> {
+    let runs = &sizes.runs;
+    let middle = |of: fn(&cvg_calibration::picture::EffectSize) -> f64| {
+        let logs: Vec<f64> = runs.iter().map(of).filter(|v| *v > 0.0).map(f64::ln).collect();
+        (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+    };
+    let rate_0 = middle(|r| r.rate_dps.abs())?;
+    let amplitude_0 = middle(|r| r.amplitude_v)?;
+    let id = sizes.id.description().id;
+    let (p, q) = (i32::from(sizes.scaling.rate), i32::from(sizes.scaling.amplitude));
+    let mut traces = Vec::new();
+    let names: Vec<String> = runs.iter().map(|r| run_name(&r.name)).collect();
+    type Of = Box<dyn Fn(&cvg_calibration::picture::EffectSize) -> f64>;
+    let panels: [(&str, Of, Of, i32, f64); 2] = [
+        ("", Box::new(|r| r.rate_dps.abs()), Box::new(move |r| (r.amplitude_v / amplitude_0).powi(-q)), p, rate_0),
+        ("2", Box::new(|r| r.amplitude_v), Box::new(move |r| (r.rate_dps.abs() / rate_0).powi(-p)), q, amplitude_0),
+    ];
+    for (panel, x, reduce, power, x_0) in &panels {
+        let (xa, ya) = (format!("x{panel}"), format!("y{panel}"));
+        let xs: Vec<f64> = runs.iter().map(x).collect();
+        traces.push(json!({
+            "type": "scatter", "mode": "markers", "name": "each run alone", "legendgroup": "m", "showlegend": panel.is_empty(),
+            "xaxis": xa, "yaxis": ya, "x": shorts(xs.iter().copied()), "text": names,
+            "y": shorts(runs.iter().map(|r| r.measured_deg[0] * reduce(r))),
+            "error_y": {"type": "data", "array": shorts(runs.iter().map(|r| r.measured_deg[1] * reduce(r))), "color": "@muted"},
+            "marker": {"size": 8, "color": "@declared", "symbol": "circle"},
+            "hovertemplate": "%{text}<br>%{x:.4g}: %{y:.3g}°",
+        }));
+        let level = runs.iter().map(|r| {
+            (r.fitted_deg * reduce(r)).max(f64::MIN_POSITIVE).ln()
+                - f64::from(*power) * (x(r) / x_0).max(f64::MIN_POSITIVE).ln()
+        });
+        let level = (level.sum::<f64>() / runs.len() as f64).exp();
+        let (lo, hi) = xs.iter().fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(*v), h.max(*v)));
+        let (lo, hi) = if lo < 0.98 * hi { (lo, hi) } else { (0.9 * lo, 1.1 * hi) };
+        let law: Vec<f64> = (0..=24).map(|i| lo * (hi / lo).powf(f64::from(i) / 24.0)).collect();
+        traces.push(json!({
+            "type": "scatter", "mode": "lines", "name": "its law", "legendgroup": "l", "showlegend": panel.is_empty(),
+            "xaxis": xa, "yaxis": ya, "x": shorts(law.iter().copied()),
+            "y": shorts(law.iter().map(|x| level * (x / x_0).powi(*power))),
+            "line": {"color": "@raw", "dash": "dash", "width": 2}, "hoverinfo": "skip",
+        }));
+    }
+    let y = json!({"title": {"text": "rms in the angle [deg]"}, "rangemode": "tozero"});
+    let layout = json!({
+        "xaxis": {"title": {"text": "rate [deg/s]"}, "domain": [0.0, 0.46]}, "yaxis": y,
+        "xaxis2": {"title": {"text": "amplitude [V]"}, "domain": [0.57, 1.0], "anchor": "y2"},
+        "yaxis2": {"rangemode": "tozero", "anchor": "x2"},
+    });
+    let law = |power: i32, of: &str| match power {
+        0 => format!("does not depend on the {of}"),
+        1 => format!("grows with the {of}"),
+        -1 => format!("falls as one over the {of}"),
+        n => format!("goes as the {of} to the power {n}"),
+    };
+    let through = if sizes.id == EffectId::Anisoelasticity {
+        " It acts through the quadrature that the loop leaves, so the law is a rough one."
+    } else {
+        ""
+    };
+    let caption = format!(
+        "{}: by its definition it {} and {}.{through} Each point is what one run alone says of it, with its 95 % interval.",
+        sizes.id.description().title,
+        law(p, "rate"),
+        law(q, "amplitude")
+    );
+    (runs.len() > 1)
+        .then(|| Figure::new(&format!("scaling-{id}"), &format!("Scaling of {id}"), caption, traces, layout))
+}
+
+fn correlations(picture: &Picture) -> Option<Figure> {
+    let c = &picture.correlations;
+    if c.names.len() < 2 {
+        return None;
+    }
+    let rows: Vec<Value> = c.rows.iter().map(|r| shorts(r.iter().copied())).collect();
+    let traces = vec![json!({
+        "type": "heatmap", "x": c.names, "y": c.names, "z": rows, "zmin": -1, "zmax": 1,
+        "colorscale": [[0.0, "#d55e00"], [0.5, "@zero"], [1.0, "#0072b2"]],
+        "hovertemplate": "%{x}<br>%{y}<br>%{z:.3f}<extra></extra>",
+    })];
+    let layout = json!({
+        "xaxis": {"tickangle": -40, "showgrid": false}, "yaxis": {"autorange": "reversed", "showgrid": false},
+        "margin": {"l": 190, "r": 16, "t": 16, "b": 150},
+    });
+    let caption = "Of everything that was fitted. Near ±1 the data tell only a combination of the two.";
+    Some(Figure::new("correlations", "Correlations", caption, traces, layout).wide())
+}

@@ -1,0 +1,173 @@
+//! `report.html`: the report for a person, in one file that needs no network.
+//!
+//! The page is plain HTML that can be read, searched and printed as it is; the figures are data beside it, drawn by
+//! Plotly, whose script comes with its crate and is part of the file.
+
+mod figures;
+mod finding;
+mod tables;
+
+use std::fmt::Write as _;
+
+use cvg_calibration::Identification;
+use plotly::Plot;
+use serde_json::Value;
+
+use self::figures::Figure;
+use self::finding::{finding, times};
+use crate::{Failure, clouds, commands};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+/// Nothing is fetched, whatever a name in a recording says.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:";
+/// Points of the still picture for readers without scripts.
+const STILL_POINTS: usize = 600;
+
+/// The report of an identification.
+pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
+    let r = &identified.report;
+    let figures = figures::all(identified);
+    let mut h = String::with_capacity(6 << 20);
+    let _ = write!(
+        h,
+        "<!doctype html>\n<html lang=\"en\" data-theme=\"light\"><head><meta charset=\"utf-8\"><meta \
+         http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\"><meta name=\"viewport\" \
+         content=\"width=device-width,initial-scale=1\"><title>{0}: cvg report</title><style>{STYLE}</style></head><body>\
+         <header><div class=\"bar\"><h1>{0} · {1}</h1><button id=\"theme\" type=\"button\" hidden \
+         aria-label=\"switch between light and dark\">Dark</button></div>",
+        escape(&r.device),
+        escape(&r.instrument)
+    );
+    headline(&mut h, identified);
+    warnings(&mut h, identified);
+    stages(&mut h, identified);
+    h.push_str(
+        "<nav aria-label=\"sections\"><a href=\"#look\">Figures</a><a href=\"#parameters\">Parameters</a><a \
+         href=\"#effects\">Effects</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
+         href=\"#files\">Files</a></nav></header><main>",
+    );
+    draw(&mut h, identified, &figures)?;
+    tables::all(&mut h, identified);
+    let _ = write!(
+        h,
+        "<details><summary>report.json</summary><div class=\"scroll\" tabindex=\"0\"><pre>{}</pre></div></details></main>\
+         <footer>cvg {}, schema {}. Errors are angle minus the best line, angular gain and bias refitted on the same \
+         held-out samples.</footer>",
+        escape(&commands::report_json(identified)?),
+        env!("CARGO_PKG_VERSION"),
+        escape(&r.schema)
+    );
+    let data: Vec<Value> = figures.iter().map(Figure::data).collect();
+    let data = serde_json::to_string(&data).map_err(Failure::input)?;
+    // no text within a script may end it
+    let _ = write!(
+        h,
+        "<script type=\"application/json\" id=\"figures\">{}</script>{}<script>{SCRIPT}</script></body></html>\n",
+        data.replace("</", "<\\/"),
+        plotly_script()
+    );
+    Ok(h)
+}
+
+/// Plotly alone; the formula renderer that the crate puts behind it is not needed.
+fn plotly_script() -> String {
+    let both = Plot::offline_js_sources();
+    const END: &str = "</script>";
+    both.find(END).map_or(both.clone(), |at| both[..at + END.len()].to_owned())
+}
+
+fn headline(h: &mut String, identified: &Identification) {
+    let held = &identified.report.heldout;
+    let before = held.raw.unwrap_or(held.declared);
+    let _ = write!(
+        h,
+        "<p class=\"headline\">{} <span class=\"arrow\">→</span> {} rms angle error, {}</p><p class=\"finding\">{}</p>",
+        finding::degrees(before.rms_deg),
+        finding::degrees(held.discovered.rms_deg),
+        times(before.rms_deg, held.discovered.rms_deg),
+        escape(&finding(&identified.report))
+    );
+}
+
+fn warnings(h: &mut String, identified: &Identification) {
+    let list = &identified.report.warnings;
+    if list.is_empty() {
+        return;
+    }
+    h.push_str("<section class=\"warnings\" aria-labelledby=\"heed\"><h2 id=\"heed\">Warnings</h2><ul>");
+    for w in list {
+        let _ = write!(h, "<li>{}</li>", escape(w));
+    }
+    h.push_str("</ul></section>");
+}
+
+fn stages(h: &mut String, identified: &Identification) {
+    let held = &identified.report.heldout;
+    h.push_str("<div class=\"stages\">");
+    let mut card = |class: &str, value: Option<f64>, what: &str| {
+        let value = value.map_or("the raw angle does not turn".to_owned(), finding::degrees);
+        let _ = write!(h, "<div class=\"stage {class}\"><b>{value}</b><span>{what}</span></div>");
+    };
+    card("raw", held.raw.map(|e| e.rms_deg), "raw, as recorded");
+    card("declared", Some(held.declared.rms_deg), "after the paper's model");
+    card("discovered", Some(held.discovered.rms_deg), "after all that was found");
+    card("floor", Some(held.noise_floor_deg), "noise of the recording");
+    h.push_str("</div>");
+}
+
+fn draw(h: &mut String, identified: &Identification, figures: &[Figure]) -> Result<(), Failure> {
+    h.push_str(
+        "<h2 id=\"look\">Figures</h2><p class=\"keys\">Drag to zoom, double-click to reset, point to read off. With the \
+         keyboard: focus a figure; <kbd>←</kbd> <kbd>→</kbd> <kbd>↑</kbd> <kbd>↓</kbd> move, <kbd>+</kbd> <kbd>-</kbd> \
+         zoom, <kbd>0</kbd> shows all.</p>",
+    );
+    let _ = write!(
+        h,
+        "<noscript><p>The figures need scripts, which this file brings along; here is one without.</p>{}</noscript>",
+        clouds::bias_svg(identified, STILL_POINTS, true)?
+    );
+    h.push_str("<div class=\"figures\">");
+    for f in figures {
+        let id = escape(&f.id);
+        let wide = if f.wide { " class=\"wide\"" } else { "" };
+        let title = escape(&f.title);
+        let _ = write!(h, "<figure{wide} aria-labelledby=\"title-{id}\"><h3 id=\"title-{id}\">{title}</h3>");
+        if !f.toggles.is_empty() {
+            let _ = write!(h, "<div class=\"toggles\" role=\"group\" aria-label=\"stages shown in {title}\">");
+            for (mark, label) in &f.toggles {
+                let _ = write!(
+                    h,
+                    "<button type=\"button\" data-of=\"{id}\" data-series=\"{0}\" aria-pressed=\"true\">{1}</button>",
+                    escape(mark),
+                    escape(label)
+                );
+            }
+            h.push_str("</div>");
+        }
+        let caption = escape(&f.caption);
+        let _ = write!(
+            h,
+            "<div class=\"plot\" id=\"plot-{id}\" tabindex=\"0\" role=\"application\" aria-label=\"{title}, a chart: \
+             {caption}\"></div><figcaption>{caption}</figcaption></figure>"
+        );
+    }
+    h.push_str("</div>");
+    Ok(())
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plotly_script;
+
+    #[test]
+    fn the_script_of_the_figures_is_one_and_whole() {
+        let script = plotly_script();
+        assert_eq!((script.matches("<script").count(), script.matches("</script>").count()), (1, 1));
+        assert!(script.len() > 1_000_000 && script.contains("plotly.js v"), "{} bytes", script.len());
+    }
+}

@@ -1,0 +1,107 @@
+"use strict";
+(() => {
+  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const root = document.documentElement;
+  const button = document.getElementById("theme");
+  // Okabe and Ito; the darker ones are lightened on a dark page
+  const inks = {
+    light: { "@raw": "#d55e00", "@declared": "#0072b2", "@discovered": "#009e73", "@4": "#cc79a7", "@5": "#e69f00",
+      "@6": "#56b4e9", "@7": "#333333", "@muted": "#777777", "@band": "rgba(120,120,120,0.18)", "@zero": "#f5f5f5" },
+    dark: { "@raw": "#ff8c3a", "@declared": "#56b4e9", "@discovered": "#2fd3a4", "@4": "#e9a3c9", "@5": "#f0c14b",
+      "@6": "#9ad5ff", "@7": "#dddddd", "@muted": "#a0a0a0", "@band": "rgba(200,200,200,0.18)", "@zero": "#22272b" },
+  };
+  const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+  let chosen = null;
+  const theme = () => chosen || (prefersDark.matches ? "dark" : "light");
+  const inked = (value, ink) => {
+    if (typeof value === "string") return ink[value] || value;
+    if (Array.isArray(value)) return typeof value[0] === "number" ? value : value.map((v) => inked(v, ink));
+    if (value && typeof value === "object")
+      return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, inked(v, ink)]));
+    return value;
+  };
+  const styled = (figure, name, width) => {
+    const dark = name === "dark";
+    const [fg, grid] = dark ? ["#ececec", "#343a40"] : ["#1a1a1a", "#e4e4e4"];
+    const layout = inked(figure.layout, inks[name]);
+    for (const key of Object.keys(layout))
+      if (/^[xy]axis/.test(key))
+        layout[key] = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, ...layout[key] };
+    return {
+      traces: inked(figure.traces, inks[name]),
+      layout: {
+        margin: { l: 64, r: 16, t: 16, b: 48 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+        font: { color: fg, family: "system-ui, sans-serif", size: 13 }, hovermode: "closest",
+        hoverlabel: { bgcolor: dark ? "#2a3036" : "#ffffff", font: { color: fg } },
+        legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, ...layout, ...(width ? { width } : {}),
+      },
+    };
+  };
+  const options = { responsive: true, displaylogo: false };
+  const hidden = new Map();
+  const draw = (figure, name = theme(), width = null) => {
+    const target = document.getElementById("plot-" + figure.id);
+    const { traces, layout } = styled(figure, name, width);
+    const off = hidden.get(figure.id);
+    if (off) for (const trace of traces) if (off.has(trace.meta)) trace.visible = false;
+    return Plotly.react(target, traces, layout, options).then(() => { target.dataset.drawn = "true"; });
+  };
+  const drawn = () => figures.filter((f) => document.getElementById("plot-" + f.id).dataset.drawn);
+  const retheme = () => {
+    root.dataset.theme = theme();
+    button.textContent = theme() === "dark" ? "Light" : "Dark";
+    drawn().forEach((figure) => draw(figure));
+  };
+  button.hidden = false;
+  button.addEventListener("click", () => { chosen = theme() === "dark" ? "light" : "dark"; retheme(); });
+  prefersDark.addEventListener("change", retheme);
+  retheme();
+
+  for (const toggle of document.querySelectorAll("button[data-of]"))
+    toggle.addEventListener("click", () => {
+      const id = toggle.dataset.of;
+      const off = hidden.get(id) || hidden.set(id, new Set()).get(id);
+      const on = toggle.getAttribute("aria-pressed") !== "true";
+      toggle.setAttribute("aria-pressed", String(on));
+      if (on) off.delete(toggle.dataset.series); else off.add(toggle.dataset.series);
+      draw(figures.find((f) => f.id === id));
+    });
+
+  // arrows move, + and - zoom, 0 shows all
+  const axes = (target, letter) => Object.keys(target._fullLayout).filter((k) => new RegExp(`^${letter}axis\\d*$`).test(k));
+  const move = (target, letter, change) => {
+    const update = {};
+    for (const name of axes(target, letter)) {
+      const range = target._fullLayout[name].range.map(Number);
+      if (range.every(Number.isFinite)) update[name + ".range"] = change(range);
+    }
+    Plotly.relayout(target, update);
+  };
+  const shift = (share) => ([a, b]) => [a + share * (b - a), b + share * (b - a)];
+  const zoom = (by) => ([a, b]) => [(a + b) / 2 - by * (b - a) / 2, (a + b) / 2 + by * (b - a) / 2];
+  const keys = {
+    ArrowLeft: (t) => move(t, "x", shift(-0.1)), ArrowRight: (t) => move(t, "x", shift(0.1)),
+    ArrowDown: (t) => move(t, "y", shift(-0.1)), ArrowUp: (t) => move(t, "y", shift(0.1)),
+    "+": (t) => { move(t, "x", zoom(0.7)); move(t, "y", zoom(0.7)); },
+    "-": (t) => { move(t, "x", zoom(1 / 0.7)); move(t, "y", zoom(1 / 0.7)); },
+    0: (t) => Plotly.relayout(t, Object.fromEntries([...axes(t, "x"), ...axes(t, "y")].map((a) => [a + ".autorange", true]))),
+  };
+  for (const target of document.querySelectorAll(".plot"))
+    target.addEventListener("keydown", (event) => {
+      const act = keys[event.key];
+      if (!act || !target.dataset.drawn || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      act(target);
+    });
+
+  // what is in sight is drawn first, the rest when there is time
+  const queue = [...figures];
+  const next = () => {
+    const figure = queue.shift();
+    if (!figure) { root.dataset.ready = "true"; return; }
+    draw(figure).then(() => setTimeout(next));
+  };
+  requestAnimationFrame(() => setTimeout(next));
+  addEventListener("beforeprint", () => { root.dataset.theme = "light"; figures.forEach((f) => draw(f, "light", 680)); });
+  addEventListener("afterprint", () => { root.dataset.theme = theme(); figures.forEach((f) => draw(f)); });
+})();
