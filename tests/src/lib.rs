@@ -9,6 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench;
+pub mod blind;
 pub mod carrier;
 pub mod domain;
 pub mod proof;

@@ -1,4 +1,5 @@
 //! The instrument's signal processing and the plant it is tried on: requirements of `specs/dsp.md`.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use core::f64::consts::{PI, TAU};
 

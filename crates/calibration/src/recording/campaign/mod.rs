@@ -139,7 +139,7 @@ impl Campaign {
             [first, ..] => first.parent().and_then(Path::file_name),
             [] => None,
         };
-        let device = name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_else(|| "recordings".to_owned());
+        let device = name.map_or_else(|| "recordings".to_owned(), |name| name.to_string_lossy().into_owned());
         let runs = recordings.into_iter().map(Self::rotation).collect::<Result<_, _>>()?;
         Ok(Self { source: sources.into_iter().next().unwrap_or_default(), device, runs, ..Self::default() })
     }

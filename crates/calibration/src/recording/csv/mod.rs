@@ -177,7 +177,7 @@ fn read_records(
         while piece.rows < sizes.records && piece.fault.is_none() {
             match records.read(&mut record) {
                 Ok(true) if record.is_blank || plain::is_comment(dialect, record.fields().next()) => {
-                    piece.add_blank(record.line - assembly.next_line())
+                    piece.add_blank(record.line - assembly.next_line());
                 }
                 Ok(true) => {
                     piece.add(dialect, record.fields(), record.line - assembly.next_line(), record.is_terminated);
