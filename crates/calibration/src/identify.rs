@@ -40,6 +40,8 @@ const EDGE: usize = 30;
 /// What the energy balance leaves of ln a, and how far it is trusted at best.
 const BALANCE_NOISE: f64 = 1e-3;
 const BALANCE_SHARE: f64 = 0.3;
+/// How far below the usual misfit of all runs, as a share of it, one run's is believed.
+const LARGEST_LEAD: f64 = 0.3;
 /// A split that the quadrature balance cannot rule out, rad/s.
 const LEAST_ANISOELASTICITY: f64 = 0.02;
 /// The smallest noise that is believed, rad: rounding of the angle itself.
@@ -347,26 +349,39 @@ impl Bench {
     /// Measures the noise of every track from what a fit leaves, and sets the limits beyond which a residual is a spike.
     pub(crate) fn measure_noise(&mut self, fit: &Fit) {
         let rests = residuals(&self.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Dense);
-        for (prepared, segments) in self.tracks.iter_mut().zip(rests) {
-            if segments.is_empty() {
-                continue;
-            }
-            let longest = segments.iter().max_by_key(|s| s.samples);
-            if let Some(s) = longest {
+        let mut left = Vec::with_capacity(rests.len());
+        for (prepared, segments) in self.tracks.iter_mut().zip(&rests) {
+            if let Some(s) = segments.iter().max_by_key(|s| s.samples) {
                 prepared.white = Noise {
                     angle: white_noise(&s.angle).max(LEAST_NOISE),
                     amplitude: white_noise(&s.amplitude).max(LEAST_NOISE),
                 };
             }
-            let angle = robust_deviation(segments.iter().flat_map(|s| s.angle.iter().copied()));
-            let amplitude = robust_deviation(segments.iter().flat_map(|s| s.amplitude.iter().copied()));
-            // Weights follow what is really left, so that a misfit cannot outvote a prior or another run.
+            left.push((!segments.is_empty()).then(|| Noise {
+                angle: robust_deviation(segments.iter().flat_map(|s| s.angle.iter().copied())),
+                amplitude: robust_deviation(segments.iter().flat_map(|s| s.amplitude.iter().copied())),
+            }));
+        }
+        let excess = |p: &Prepared, n: &Noise| n.angle / p.white.angle;
+        let usual = median(
+            &mut self
+                .tracks
+                .iter()
+                .zip(&left)
+                .filter_map(|(p, n)| n.as_ref().map(|n| excess(p, n)))
+                .collect::<Vec<_>>(),
+        );
+        for (prepared, left) in self.tracks.iter_mut().zip(left) {
+            let Some(left) = left else { continue };
+            // Weights follow what is really left, so that a misfit cannot outvote a prior or another run; but a run
+            // that fits while the others do not must not have it all its way.
+            let angle = left.angle.max(LARGEST_LEAD * usual * prepared.white.angle);
             prepared.noise.angle = angle.max(prepared.white.angle);
             if prepared.noise.amplitude.is_finite() {
-                prepared.noise.amplitude = amplitude.max(prepared.white.amplitude);
+                prepared.noise.amplitude = left.amplitude.max(prepared.white.amplitude);
             }
             prepared.limit =
-                Noise { angle: SPIKE * angle.max(LEAST_NOISE), amplitude: SPIKE * amplitude.max(LEAST_NOISE) };
+                Noise { angle: SPIKE * angle.max(LEAST_NOISE), amplitude: SPIKE * left.amplitude.max(LEAST_NOISE) };
         }
     }
 }
@@ -410,8 +425,11 @@ pub(crate) fn declared_hypothesis(start: &Hypothesis) -> Hypothesis {
 
 /// A residual beyond this multiple of its white part is a misfit.
 const LARGEST_EXCESS: f64 = 4.0;
-/// Rounds of fit, noise and spikes.
+/// Rounds of fit, noise and spikes: those that come before the drive is freed with the last, and the most there are.
 const ROUNDS: usize = 3;
+const MOST_ROUNDS: usize = 6;
+/// Weights that what is left contradicts by more than this factor call for another round.
+const SAME_NOISE: f64 = 1.5;
 
 /// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
 ///
@@ -439,7 +457,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
             None => bench.balance_energy(&mut hypothesis),
         }
         bench.balance_quadrature(&hypothesis);
-        let last = round + 1 == ROUNDS;
+        let last = round + 1 >= ROUNDS;
         // What the commands do is adjusted last, and only when little else is left: it multiplies, and a misfit would
         // drag it along.
         let free_drive = last && bench.tracks_differ() && bench.excess() < LARGEST_EXCESS;
@@ -451,10 +469,15 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
         for (p, s) in bench.tracks.iter_mut().zip(&result.starts) {
             p.starts.clone_from(s);
         }
-        if last {
+        let before: Vec<f64> = bench.tracks.iter().map(|p| p.noise.angle).collect();
+        bench.measure_noise(&result);
+        let settled = bench.tracks.iter().zip(before).all(|(p, before)| {
+            let change = p.noise.angle / before;
+            change < SAME_NOISE && change > SAME_NOISE.recip()
+        });
+        round += 1;
+        if last && (settled || round == MOST_ROUNDS) {
             return Ok(Fitted { fit: result, ring_downs, drive });
         }
-        bench.measure_noise(&result);
-        round += 1;
     }
 }

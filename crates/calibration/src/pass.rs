@@ -65,6 +65,9 @@ impl Pace {
     }
 }
 
+/// So many samples in a row are no spikes: the prediction is off, and would be lost for good without its integrals.
+const MOST_PASSED_OVER: usize = 3;
+
 /// Walks `segment` and hands each row to `take`.
 pub(crate) fn walk(
     track: &Track,
@@ -87,6 +90,7 @@ pub(crate) fn walk(
     let harmonic = hypothesis.input_harmonic();
     let zero_input = track.input_rad[segment.range.start];
     let mut last: Option<usize> = None;
+    let mut passed_over = 0;
     for i in segment.range.clone().step_by(stride) {
         let rate = track.rate(i);
         let at =
@@ -109,9 +113,13 @@ pub(crate) fn walk(
         let along = start.angle
             + start.drift * (track.t_s[i] - track.t_s[segment.range.start])
             + sense * hypothesis.angular_gain * input;
-        let off = wrapped(vibration.theta - along - integrals.sum[0], hypothesis.period_rad);
-        if hypothesis.instrument == Instrument::Gyroscope && (off.abs() <= pace.spike || integrals.known == 0) {
-            integrals.extend_to(track.t_s[i], &integrands);
+        let off = wrapped(vibration.theta - along - integrals.ahead(track.t_s[i]), hypothesis.period_rad);
+        if hypothesis.instrument == Instrument::Gyroscope {
+            let believed = off.abs() <= pace.spike || integrals.known == 0 || passed_over == MOST_PASSED_OVER;
+            passed_over = if believed { 0 } else { passed_over + 1 };
+            if believed {
+                integrals.extend_to(track.t_s[i], &integrands);
+            }
         }
         let predicted = along + integrals.sum[0];
         let ln_a = start.amplitude + integrals.sum[n + 1];
@@ -187,6 +195,12 @@ struct Integrals {
 impl Integrals {
     fn new(n: usize) -> Self {
         Self { sum: vec![0.0; n], past: [vec![0.0; n], vec![0.0; n], vec![0.0; n]], times: [0.0; 3], known: 0 }
+    }
+
+    /// The first of them at a time not far ahead, from what is known so far.
+    fn ahead(&self, t: f64) -> f64 {
+        let since = if self.known > 0 { t - self.times[0] } else { 0.0 };
+        self.sum[0] + self.past[0][0] * since
     }
 
     fn extend_to(&mut self, t: f64, f: &[f64]) {
