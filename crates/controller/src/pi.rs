@@ -89,6 +89,8 @@ impl<T: Float> Pi<T> {
         Ok(Self { gain, integration_time_s, period_s, limit_v, integral_limit })
     }
 
+    //= specs/dsp.md#tuning
+    //# A disturbance of a loop MUST decay with the natural frequency and the damping ratio that the loop was tuned to.
     /// A controller for the energy or the quadrature of a vibration of amplitude `amplitude_v` under drive gain
     /// `drive_per_s_v` = b (1/s per V), by natural frequency (rad/s) and damping ratio: the tuning rule above.
     ///

@@ -253,6 +253,10 @@ impl<T: Float> Supervisor<T> {
         })
     }
 
+    //= specs/dsp.md#start
+    //# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
+    //= specs/dsp.md#recovery
+    //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
     /// The orders for the window to come, after the window `o`. Total.
     #[inline]
     pub fn step(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {

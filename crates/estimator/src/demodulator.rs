@@ -151,6 +151,10 @@ impl<T: Float> Demodulator<T> {
         }
     }
 
+    //= specs/dsp.md#carrier-rejection
+    //# A stationary carrier MUST be demodulated to its envelope whatever the number of samples in a window and whatever the offset of the converter.
+    //= specs/dsp.md#group-delay
+    //# An envelope that changes evenly MUST be measured as it is at the middle of its window.
     /// The envelope of a full window that ends where `end` begins, one sample after its last, with the step that was
     /// in use in it.
     #[inline]

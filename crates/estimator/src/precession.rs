@@ -91,6 +91,8 @@ impl<T: Float> Precession<T> {
         })
     }
 
+    //= specs/dsp.md#unwrapping
+    //# The unwrapped angle MUST follow a turning pattern through any number of half turns without a jump.
     /// Follows the pattern to the window of the pendulum variables `p`. Total.
     #[inline]
     pub fn step(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {

@@ -31,6 +31,8 @@ impl<T: Float> Instrument<T> {
         }
     }
 
+    //= specs/dsp.md#bounded-commands
+    //# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
     /// One sample: what the converters read, V, against what they are to put out next, V, and a status.
     ///
     /// Total: any bit pattern in; out come finite values within ±`dac_limit_v`.
