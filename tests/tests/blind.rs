@@ -33,8 +33,8 @@ struct Outcome {
     /// effects of the library that are claimed as causes
     claimed: Vec<String>,
     over_floor: f64,
-    /// parameters of rightly named effects whose interval holds the truth, and all with an interval
-    parameters: [usize; 2],
+    /// of each rightly named effect: parameters whose interval holds the truth, and all with an interval
+    parameters: Vec<(&'static str, [usize; 2])>,
     /// the same for detection ratio, actuation ratio and angular gain
     gains: [[usize; 2]; 3],
     details: String,
@@ -67,7 +67,7 @@ fn outcome(seed: u64) -> Outcome {
         answer: "refused".into(),
         claimed: Vec::new(),
         over_floor: f64::INFINITY,
-        parameters: [0; 2],
+        parameters: Vec::new(),
         gains: [[0; 2]; 3],
         details: String::new(),
         setup,
@@ -88,9 +88,7 @@ fn outcome(seed: u64) -> Outcome {
     }
     outcome.over_floor = over_floor(&identified);
     let named = outcome.setup.drawn.iter().filter(|d| outcome.names(d));
-    outcome.parameters = named
-        .map(|d| parameters_held(&identified, d.effect.id, &d.effect.values))
-        .fold([0; 2], |[held, all], [h, a]| [held + h, all + a]);
+    outcome.parameters = named.map(|d| (d.id(), parameters_held(&identified, d.effect.id, &d.effect.values))).collect();
     outcome.gains = gains_held(&identified, &outcome.setup.settings);
     outcome.details = details(&identified);
     outcome
@@ -174,18 +172,27 @@ fn print_confusion(outcomes: &[Outcome]) {
             *instead.entry(d.id()).or_default().entry(&o.answer).or_default() += 1;
         }
     }
-    println!("\n| drawn | above {NAMED_ABOVE} × floor | named | below | named | answered where it was not named |");
-    println!("| --- | ---: | ---: | ---: | ---: | --- |");
+    println!(
+        "\n| drawn | above {NAMED_ABOVE} × floor | named | below | named | intervals that hold | answered where it was \
+         not named |"
+    );
+    println!("| --- | ---: | ---: | ---: | ---: | ---: | --- |");
     for (id, [large, named, small, named_small]) in drawn {
         let list = instead.remove(id).unwrap_or_default();
         let list: Vec<String> = list.iter().map(|(answer, n)| format!("{answer}: {n}")).collect();
-        println!("| `{id}` | {large} | {named} | {small} | {named_small} | {} |", list.join("; "));
+        let told = outcomes.iter().flat_map(|o| &o.parameters).filter(|(of, _)| *of == id);
+        let [held, all] = total(told.map(|(_, counts)| *counts));
+        println!("| `{id}` | {large} | {named} | {small} | {named_small} | {held} of {all} | {} |", list.join("; "));
     }
     for count in 0..3 {
         let of = outcomes.iter().filter(|o| o.setup.drawn.len() == count);
         let (n, flawless) = of.fold((0, 0), |(n, f), o| (n + 1, f + usize::from(o.flawless())));
         println!("{count} drawn: {n} campaigns, {flawless} without a flaw");
     }
+}
+
+fn total(counts: impl Iterator<Item = [usize; 2]>) -> [usize; 2] {
+    counts.fold([0; 2], |[held, all], [h, a]| [held + h, all + a])
 }
 
 fn print_flaws(outcomes: &[Outcome]) {
@@ -227,17 +234,13 @@ fn hidden_effects_are_named_and_none_is_named_where_none_is() {
     let mut ratios: Vec<f64> = outcomes.iter().map(|o| o.over_floor).collect();
     ratios.sort_by(f64::total_cmp);
     let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share).round() as usize];
-    let sum = |f: &dyn Fn(&Outcome) -> [usize; 2]| {
-        outcomes.iter().map(f).fold([0; 2], |[held, all], [h, a]| [held + h, all + a])
-    };
+    let gain = |which: usize| total(outcomes.iter().map(|o| o.gains[which]));
     println!("\nheld-out over floor: median {:.3}, 95 % {:.3}, largest {:.3}", at(0.5), at(0.95), at(1.0));
     println!(
-        "intervals that hold the truth: parameters of named effects {:?}, detection ratio {:?}, actuation ratio {:?}, \
-         angular gain {:?}",
-        sum(&|o| o.parameters),
-        sum(&|o| o.gains[0]),
-        sum(&|o| o.gains[1]),
-        sum(&|o| o.gains[2])
+        "intervals that hold the truth: detection ratio {:?}, actuation ratio {:?}, angular gain {:?}",
+        gain(0),
+        gain(1),
+        gain(2)
     );
     let large = outcomes.iter().flat_map(|o| &o.setup.drawn).filter(|d| d.size() >= NAMED_ABOVE).count();
     let missed = outcomes.iter().flat_map(Outcome::missed).count();

@@ -398,7 +398,7 @@ fn candidates(bench: &Bench, hypothesis: &Hypothesis, residual: &Evaluation, den
             continue;
         }
         let searched = d.parameters.iter().enumerate().find_map(|(p, parameter)| match parameter.role {
-            ParameterRole::Searched(over) => Some((p, over)),
+            ParameterRole::Searched(over) | ParameterRole::Located(over) => Some((p, over)),
             _ => None,
         });
         let chosen = d.parameters.iter().position(|p| matches!(p.role, ParameterRole::Chosen(_)));

@@ -137,7 +137,11 @@ impl Hypothesis {
 
     /// Everything a fit may adjust about the effects: their fitted parameters, and the refined ones where asked for.
     pub fn effect_unknowns(&self) -> Vec<Unknown> {
-        let adjusted = |m: &Member, role: Role| role == Role::Fitted || (role == Role::Refined && m.refined);
+        let adjusted = |m: &Member, role: Role| match role {
+            Role::Fitted | Role::Located(_) => true,
+            Role::Refined => m.refined,
+            Role::Searched(_) | Role::Chosen(_) => false,
+        };
         self.members
             .iter()
             .enumerate()

@@ -127,7 +127,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
     let count = on_fit.errors().count();
     let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
-    let covariance = covariance(&bench, &fitted.fit, white);
+    let covariance = covariance(&bench, &fitted.fit);
 
     let mut warnings = std::mem::take(&mut bench.warnings);
     let knowledge = Knowledge { bench: &bench, fitted: &fitted, covariance: &covariance };
@@ -205,15 +205,12 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     })
 }
 
-/// Covariance of the unknowns: that of white residuals, or the larger of it and the block covariance where they have
+/// Covariance of the unknowns: the larger of that of white residuals and of the block covariance, which allows for their
 /// memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
-fn covariance(bench: &Bench, fit: &Fit, white: bool) -> DMatrix<f64> {
+fn covariance(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
     let scale = ((fit.chi2[0] + fit.chi2[1]) / dof).max(f64::MIN_POSITIVE);
     let plain = &fit.covariance * scale * undescribed(bench, fit);
-    if white {
-        return plain;
-    }
     let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
     let n = fit.unknowns.len();
     // raise each deviation to the larger of the two and keep the correlations

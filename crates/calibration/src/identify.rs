@@ -1,6 +1,6 @@
 //! From a campaign to an identified instrument: prepare, fit what is declared, and what the residual asks for.
 
-use cvg_model::effects::{EffectId, Stage};
+use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::actuation::{DriveGains, RingDown, ring_down};
@@ -42,6 +42,8 @@ const BALANCE_NOISE: f64 = 1e-3;
 const BALANCE_SHARE: f64 = 0.3;
 /// How far below the usual misfit of all runs, as a share of it, one run's is believed.
 const LARGEST_LEAD: f64 = 0.3;
+/// How well a search places a line, as a share of its width, one over the longest run.
+const LINE_SHARE: f64 = 0.1;
 /// A split that the quadrature balance cannot rule out, rad/s.
 const LEAST_ANISOELASTICITY: f64 = 0.02;
 /// The smallest noise that is believed, rad: rounding of the angle itself.
@@ -272,6 +274,15 @@ impl Bench {
         let scale =
             drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(self.energy_balance).unwrap_or(silent);
         all.push(prior(Unknown::ForceScale, scale.0, scale.1));
+        // A search finds a line to a fraction of its width: beyond that lies another line.
+        let spans = self.tracks.iter().map(|p| p.track.t_s[p.track.t_s.len() - 1] - p.track.t_s[0]);
+        let width = LINE_SHARE / spans.fold(f64::MIN_POSITIVE, f64::max);
+        for (i, m) in hypothesis.members.iter().enumerate() {
+            let parameters = m.id.description().parameters.iter().enumerate();
+            for (p, _) in parameters.filter(|(_, p)| matches!(p.role, ParameterRole::Located(_))) {
+                all.push(prior(Unknown::Effect(i, p), m.values[p], width));
+            }
+        }
         // At one rate the sine part of anisodamping is a detection gain mismatch to the last digit: it is held, and
         // widens the interval of that.
         if let Some(member) = hypothesis.position(EffectId::Anisodamping).filter(|_| !self.tracks_differ()) {

@@ -84,11 +84,20 @@ pub(crate) fn walk(
     // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
     let mut integrals = Integrals::new(2 * (n + 1));
     let mut excess = Jet::constant(0.0);
+    // what the input effects added before the segment: the table's angle is 0 where the recording starts
+    let mut ahead = 0.0;
     let mut integrands = vec![0.0; 2 * (n + 1)];
     let (mut angle_slopes, mut amplitude_slopes) = (vec![0.0; n], vec![0.0; n]);
     let sense = hypothesis.sense();
     let harmonic = hypothesis.input_harmonic();
     let zero_input = track.input_rad[segment.range.start];
+    if harmonic > 0.0 {
+        let none = Unknowns::new(hypothesis, Vec::new());
+        let before: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
+        for step in before.windows(2) {
+            ahead += excess_angle(track, (step[0], ahead), step[1], hypothesis, &none, harmonic).value;
+        }
+    }
     let mut last: Option<usize> = None;
     let mut passed_over = 0;
     for i in segment.range.clone().step_by(stride) {
@@ -105,7 +114,7 @@ pub(crate) fn walk(
             }
         }
         if let Some(from) = last.filter(|_| harmonic > 0.0) {
-            excess = excess + excess_angle(track, from, i, hypothesis, unknowns, harmonic);
+            excess = excess + excess_angle(track, (from, ahead + excess.value), i, hypothesis, unknowns, harmonic);
         }
         last = Some(i);
         let turned = track.input_rad[i] - zero_input;
@@ -152,10 +161,11 @@ pub(crate) fn walk(
 const LARGEST_PHASE_STEP: f64 = 0.5;
 
 /// The input angle that the input effects add between two samples, rad, with slopes: two-point Gauss quadrature on
-/// pieces over which the table's harmonic turns little. Between samples the table turns evenly.
+/// pieces over which the table's harmonic turns little. Between samples the table turns evenly but for what the effects
+/// add, `excess` up to the first of them: a ripple of the rate goes by the angle that it made itself.
 fn excess_angle(
     track: &Track,
-    from: usize,
+    (from, excess): (usize, f64),
     to: usize,
     hypothesis: &Hypothesis,
     unknowns: &Unknowns,
@@ -173,7 +183,7 @@ fn excess_angle(
             let s = h * (piece as f64 + 0.5 + node);
             let at = Moment {
                 t_s: t0 + s * (t1 - t0),
-                table_rad: a0 + s * (a1 - a0),
+                table_rad: a0 + s * (a1 - a0) + excess + 0.5 * h * (t1 - t0) * sum.value,
                 precession_rad_s: hypothesis.precession(rate),
             };
             sum = sum + hypothesis.excess_rate(rate, &at, &unknowns.input);

@@ -50,6 +50,7 @@ fn role(role: Role) -> &'static str {
         Role::Fitted => "fitted",
         Role::Refined => "held at its neutral value until the data asks for it",
         Role::Searched(_) => "set by a search",
+        Role::Located(_) => "found by a search, then fitted",
         Role::Chosen(_) => "one of a few values, each tried",
     }
 }

@@ -87,6 +87,8 @@ pub enum Role {
     Refined,
     /// chosen by a search and then held
     Searched(Search),
+    /// found by a search, and from there adjusted together with all others
+    Located(Search),
     /// one of these, each tried as an alternative of its own, and then held
     Chosen(&'static [f64]),
 }
@@ -243,6 +245,11 @@ const fn refined(name: &'static str, unit: &'static str, bound: f64, scale: f64)
 /// A parameter that a search sets.
 const fn searched(name: &'static str, unit: &'static str, lower: f64, upper: f64, over: Search) -> Parameter {
     Parameter { name, unit, lower, upper, neutral: lower, scale: 1.0, role: Role::Searched(over) }
+}
+
+/// A parameter that a search starts.
+const fn located(name: &'static str, unit: &'static str, lower: f64, upper: f64, over: Search) -> Parameter {
+    Parameter { role: Role::Located(over), ..searched(name, unit, lower, upper, over) }
 }
 
 macro_rules! library {

@@ -1,7 +1,7 @@
 //! A disturbance of the angle at a fixed frequency in time: θ_d += A cos(2πft + phase), resolved into (A cos phase,
 //! A sin phase).
 
-use super::{Description, Effect, Moment, Scaling, Search, Shown, Stage, Values, fitted, searched};
+use super::{Description, Effect, Moment, Scaling, Search, Shown, Stage, Values, fitted, located};
 use crate::{Envelope, Real};
 
 /// disturbance at a fixed frequency.
@@ -16,7 +16,7 @@ impl Effect for TimePeriodic {
         empirical: false,
         in_sensors: true,
         parameters: &[
-            searched("frequency", "Hz", 1e-3, 1e6, Search::Frequency),
+            located("frequency", "Hz", 1e-3, 1e6, Search::Frequency),
             fitted("periodic_cos", "rad", 0.5, 1e-3),
             fitted("periodic_sin", "rad", 0.5, 1e-3),
         ],

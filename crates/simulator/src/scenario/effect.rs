@@ -64,7 +64,7 @@ impl TryFrom<toml::Table> for EffectSetting {
         for (parameter, value) in id.description().parameters.iter().zip(&mut values) {
             match number(&mut table, parameter.name)? {
                 Some(written) => *value = written,
-                None if matches!(parameter.role, Role::Searched(_)) => {
+                None if matches!(parameter.role, Role::Searched(_) | Role::Located(_)) => {
                     return Err(format!("{id} needs {}", parameter.name));
                 }
                 None => {}
