@@ -19,6 +19,8 @@ pub mod actuation;
 pub mod detection;
 pub mod effects;
 pub mod pendulum;
+#[cfg(any(kani, test, cvg_prove))]
+pub mod proofs;
 pub mod resonator;
 pub mod scalar;
 

@@ -19,7 +19,6 @@ pub(crate) struct Citation {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Function {
     /// relative to the repository
-    #[allow(dead_code)]
     pub(crate) file: PathBuf,
     pub(crate) line: usize,
     pub(crate) name: String,
@@ -99,25 +98,69 @@ pub(crate) fn functions(file: &Path, text: &str) -> Vec<Function> {
     found
 }
 
-/// The texts of the covers in `function` and in what it calls within its file.
-pub(crate) fn covers(function: &Function, in_file: &[Function]) -> BTreeSet<String> {
+/// `function` and what it calls, as far as it is among `known`.
+fn reached<'a>(function: &'a Function, known: &'a [Function]) -> Vec<&'a Function> {
     let mut seen = BTreeSet::from([function.name.as_str()]);
-    let mut left = vec![function];
-    let mut texts = BTreeSet::new();
-    while let Some(f) = left.pop() {
-        for call in f.body.split("cover!(").skip(1) {
-            // the text is the macro's last argument and holds no quote
-            let text = call.split_once(");").and_then(|(arguments, _)| arguments.rsplit('"').nth(1));
-            texts.extend(text.map(str::to_owned));
-        }
+    let mut found = vec![function];
+    let mut next = 0;
+    while let Some(f) = found.get(next).copied() {
+        next += 1;
         let words = f.body.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         for word in words.collect::<BTreeSet<_>>() {
-            if let Some(called) = in_file.iter().find(|g| g.name == word).filter(|_| seen.insert(word)) {
-                left.push(called);
-            }
+            found.extend(known.iter().find(|g| g.name == word).filter(|_| seen.insert(word)));
         }
     }
-    texts
+    found
+}
+
+/// The texts of the covers in `function` and in what it calls among `known`.
+pub(crate) fn covers(function: &Function, known: &[Function]) -> BTreeSet<String> {
+    let calls = reached(function, known).into_iter().flat_map(|f| f.body.split("cover!(").skip(1));
+    // the text is the macro's last argument and holds no quote
+    calls
+        .filter_map(|call| call.split_once(");").and_then(|(arguments, _)| arguments.rsplit('"').nth(1)))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// What `function` and what it calls among `known` assume: "precondition" or "budget", and the words after it.
+///
+/// # Errors
+/// Something is assumed where no comment says which of the two it is.
+pub(crate) fn assumptions(function: &Function, known: &[Function]) -> Result<Vec<(&'static str, String)>, String> {
+    let mut found = Vec::new();
+    for f in reached(function, known) {
+        let before = found.len();
+        let mut lines = f.body.lines().map(str::trim).peekable();
+        while let Some(line) = lines.next() {
+            let Some((kind, text)) = ["precondition", "budget"]
+                .into_iter()
+                .find_map(|kind| Some((kind, line.strip_prefix("// ")?.strip_prefix(kind)?.strip_prefix(": ")?)))
+            else {
+                continue;
+            };
+            let mut text = text.to_owned();
+            while let Some(more) = lines.next_if(|next| next.starts_with("// ")) {
+                text += &more[2..];
+            }
+            if !found.contains(&(kind, text.clone())) {
+                found.push((kind, text));
+            }
+        }
+        // of `sized`, a range of magnitudes, the caller says why
+        let assumes = ["kani::assume(", "any_where(", "sized(", "sized::<"].iter().any(|call| f.body.contains(call));
+        let assumes = assumes && f.name != "sized";
+        if assumes && found.len() == before && !f.body.contains("// precondition: ") && !f.body.contains("// budget: ")
+        {
+            return Err(format!("{}:{}: {} assumes without saying why", f.file.display(), f.line, f.name));
+        }
+    }
+    Ok(found)
+}
+
+/// What the doc comment of a function names in backticks and brackets: the functions that it is about.
+pub(crate) fn subjects(doc: &str) -> Vec<String> {
+    doc.split("[`").skip(1).filter_map(|rest| rest.split_once("`]")).map(|(name, _)| name.to_owned()).collect()
 }
 
 /// Every Rust source below `folder`, sorted.
@@ -145,10 +188,9 @@ pub(crate) fn read(repository: &Path, file: &Path) -> Result<Vec<Function>, Stri
 
 #[cfg(test)]
 mod tests {
-    use super::{Function, covers, functions};
+    use super::{assumptions, covers, functions, subjects};
     use std::path::Path;
 
-    /// Its citation has an @ in it, to be taken out: else it would count as evidence for the requirement.
     const TEXT: &str = r#"
 fn body<T>(share: T) {
     kani::cover!(share > 0, "positive");
@@ -165,10 +207,10 @@ fn unrelated() {
     kani::cover!(true, "never asked");
 }
 
-//@= specs/equation-03.md#signs
-//@= type=test
-//@# The sign MUST be
-//@# kept.
+//= specs/equation-03.md#no-windup
+//= type=test
+//# The integral MUST NOT grow in the direction
+//# in which the output is at its limit.
 /// What it says.
 #[kani::proof]
 #[kani::unwind(3)]
@@ -180,18 +222,17 @@ pub fn proof_it() {
 fn plain() {}
 "#;
 
-    fn parsed() -> Vec<Function> {
-        functions(Path::new("a.rs"), &TEXT.replace("//@", "//"))
-    }
-
     #[test]
     fn a_function_has_its_citation_attributes_and_text() {
-        let all = parsed();
+        let all = functions(Path::new("a.rs"), TEXT);
         let names: Vec<_> = all.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["body", "helper", "unrelated", "proof_it", "plain"]);
         let proof = &all[3];
-        assert_eq!(proof.citations[0].target, "specs/equation-03.md#signs");
-        assert_eq!(proof.citations[0].quote, "The sign MUST be kept.");
+        assert_eq!(proof.citations[0].target, "specs/equation-03.md#no-windup");
+        assert_eq!(
+            proof.citations[0].quote,
+            "The integral MUST NOT grow in the direction in which the output is at its limit."
+        );
         assert_eq!(proof.doc, "What it says.");
         assert_eq!(proof.argument("kani::unwind"), Some("3"));
         assert!(proof.has("kani::proof") && !proof.has("kani::should_panic"));
@@ -200,8 +241,25 @@ fn plain() {}
 
     #[test]
     fn covers_are_those_of_the_body_and_of_what_it_calls() {
-        let all = parsed();
+        let all = functions(Path::new("a.rs"), TEXT);
         let found: Vec<_> = covers(&all[3], &all).into_iter().collect();
         assert_eq!(found, ["helped", "none at all", "positive"]);
+    }
+
+    #[test]
+    fn an_assumption_says_which_kind_it_is_and_why() {
+        let text = "fn body() {\n    // precondition: below ten,\n    // or not\n    kani::assume(x < 10);\n    inner();\n}\n\
+            fn inner() {\n    // budget: small\n    let y = kani::any_where(|y| *y < 3);\n}\n";
+        let all = functions(Path::new("a.rs"), text);
+        let expected = vec![("precondition", "below ten, or not".to_owned()), ("budget", "small".to_owned())];
+        assert_eq!(assumptions(&all[0], &all), Ok(expected));
+        let silent = functions(Path::new("a.rs"), &text.replace("budget", "because"));
+        let refused = assumptions(&silent[0], &silent).expect_err("not labelled");
+        assert!(refused.contains("a.rs:7: inner"), "{refused}");
+    }
+
+    #[test]
+    fn subjects_are_what_the_doc_links_to() {
+        assert_eq!(subjects("Of [`Pi::step`] and [`f`], not `g`."), ["Pi::step", "f"]);
     }
 }

@@ -40,14 +40,17 @@ fn output_is_bounded<T: Float + Arbitrary>(share: T) {
 
 //= specs/equation-03.md#bounded-output
 //# The output MUST be finite and within its limit for every input.
-/// The output of every controller lies within its limit and the integral is finite, for any bits of input and state.
+/// The output of [`Pi::energy`], [`Pi::quadrature`] and [`Pi::control`] lies within its limit and the integral is
+/// finite, for any bits of input and state.
 #[kani::proof]
+#[kani::solver(minisat)]
 pub fn proof_pi_output_is_bounded_f32() {
     output_is_bounded(1.0_f32);
 }
 
 /// Half the limit is claimed.
 #[kani::proof]
+#[kani::solver(minisat)]
 #[kani::should_panic]
 pub fn twin_pi_output_is_bounded_f32() {
     output_is_bounded(0.5_f32);

@@ -14,6 +14,10 @@ use super::root::Root;
 const ALWAYS: [&str; 3] = ["panic", "access out of bounds", "cover: the end"];
 /// Loops without `#[kani::unwind]` run at most so often.
 pub(crate) const UNWIND: &str = "16";
+/// The solver of harnesses without `#[kani::solver]`: on products of floats far quicker than the other.
+pub(crate) const SOLVER: &str = "bitwuzla";
+/// Both solvers: the guards are asked of each.
+pub(crate) const SOLVERS: [&str; 2] = ["bitwuzla", "minisat"];
 /// KiB of address space for one solver.
 const MEMORY_KIB: u64 = 6_000_000;
 
@@ -24,7 +28,7 @@ pub(crate) struct Query<'a> {
     /// texts of its covers
     pub(crate) covers: Vec<&'a str>,
     pub(crate) unwind: &'a str,
-    /// `minisat`, CBMC's own, or `cadical`
+    /// `bitwuzla`, or `minisat`, which is CBMC's own
     pub(crate) solver: &'a str,
     pub(crate) timeout: Duration,
 }
@@ -112,7 +116,7 @@ fn answer(root: &Root, folder: &Path, query: &Query) -> Result<Vec<Property>, St
         .iter()
         .map(|text| format!("case {}u: __CPROVER_assert(0, \"{}\"); break;", fingerprint(text), cover(text)))
         .collect();
-    let log = folder.join(format!("{}.txt", query.name));
+    let log = folder.join(format!("{}.{}.txt", query.name, query.solver));
     let file = File::create(&log).map_err(|e| e.to_string())?;
     let mut command = Command::new("sh");
     command
@@ -126,11 +130,20 @@ fn answer(root: &Root, folder: &Path, query: &Query) -> Result<Vec<Property>, St
         .arg(format!("-DHARNESS=w2c_harness_{}", query.name))
         .arg(format!("-DCOVERS={}", cases.join(" ")))
         .current_dir(folder)
+        .env("TMPDIR", folder)
         .stdin(Stdio::null())
         .stdout(file)
         .stderr(Stdio::null());
-    if query.solver == "cadical" {
-        command.arg("--external-sat-solver").arg(root.tool("cadical"));
+    match query.solver {
+        // without `--fpa`: CBMC makes bits of the floats itself, the same as for its own solver, so that there is only one
+        // meaning of a float and NaN keeps its bits
+        "bitwuzla" => {
+            let path = std::env::var_os("PATH").unwrap_or_default();
+            let path = std::iter::once(root.tools()).chain(std::env::split_paths(&path));
+            command.arg("--bitwuzla").env("PATH", std::env::join_paths(path).map_err(|e| e.to_string())?);
+        }
+        "minisat" => {}
+        other => return Err(format!("there is no solver {other}")),
     }
     let code = wait(&mut command, query.timeout)?;
     let text = std::fs::read_to_string(&log).map_err(|e| e.to_string())?;

@@ -32,18 +32,77 @@ pub(crate) struct Harness {
     pub(crate) path: String,
     /// texts of its covers
     pub(crate) covers: Vec<String>,
+    pub(crate) assumptions: Vec<Assumption>,
 }
 
-/// What a run says of one proof.
+impl Harness {
+    /// The name without `proof_` or `twin_`.
+    fn claim(&self) -> &str {
+        self.function.name.split_once('_').map_or("", |(_, claim)| claim)
+    }
+
+    fn is_guard(&self) -> bool {
+        self.path.starts_with("guards::")
+    }
+}
+
+/// A harness to be asked of a solver.
+#[derive(Clone, Copy, Debug)]
+struct Job<'a> {
+    harness: &'a Harness,
+    solver: &'a str,
+}
+
+impl<'a> Job<'a> {
+    /// A guard is asked of every solver, anything else of its own.
+    fn of(harness: &'a Harness) -> Vec<Self> {
+        if harness.is_guard() {
+            engine::SOLVERS.into_iter().map(|solver| Self { harness, solver }).collect()
+        } else {
+            vec![Self { harness, solver: harness.function.argument("kani::solver").unwrap_or(engine::SOLVER) }]
+        }
+    }
+
+    fn key(&self) -> (&'a str, &'a str) {
+        (&self.harness.function.name, self.solver)
+    }
+}
+
+/// What a proof takes for granted.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Assumption {
+    /// `precondition` of the function, or `budget` of the solver
+    pub(crate) kind: String,
+    pub(crate) text: String,
+}
+
+/// What a run says of one proof. `README.md` of this crate tells the fields to readers of the file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct ProofResult {
     pub(crate) name: String,
+    /// `cvg-controller`
+    #[serde(rename = "crate")]
+    pub(crate) package: String,
+    /// `crates/controller/src/proofs/pi.rs:57`
+    pub(crate) place: String,
+    /// the claim, in words
+    pub(crate) claim: String,
+    /// the functions that it is about
+    pub(crate) functions: Vec<String>,
+    /// `specs/equation-03.md#bounded-output`
+    pub(crate) requirements: Vec<String>,
+    /// `f32`, `f64`, or nothing where no scalar is involved
+    pub(crate) scalar: String,
+    pub(crate) solver: String,
+    pub(crate) assumptions: Vec<Assumption>,
     /// `passed` or `failed`
     pub(crate) status: String,
     /// `rejected` or `accepted`
     pub(crate) twin: String,
-    /// how many covers there are; all are reached where the status is `passed`
-    pub(crate) covers: usize,
+    /// what had to be reachable besides the end; all of it is where `cover` is `reached`
+    pub(crate) covers: Vec<String>,
+    /// `reached`, `missed`, or `unknown` where there is no verdict
+    pub(crate) cover: String,
     pub(crate) seconds: f64,
     pub(crate) twin_seconds: f64,
     /// what was found, in words
@@ -64,29 +123,50 @@ pub(crate) fn harnesses(repository: &Path) -> Result<Vec<Harness>, String> {
     let mut found = Vec::new();
     for name in compile::CRATES {
         let folder = repository.join("crates").join(name).join("src");
+        let mut files = Vec::new();
         for file in source::rust_files(&folder) {
             let inside = file.strip_prefix(&folder).map_err(|e| e.to_string())?.with_extension("");
             if !inside.starts_with("proofs") {
                 continue;
             }
+            files.push((file, inside));
+        }
+        let mut of_crate = Vec::new();
+        for (file, _) in &files {
+            of_crate.extend(source::read(repository, file)?);
+        }
+        for (file, inside) in files {
             let modules: Vec<_> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
             let path = format!("cvg_{name}::{}", modules.join("::"));
-            found.extend(in_file(&source::read(repository, &file)?, path.trim_end_matches("::mod")));
+            let functions = source::read(repository, &file)?;
+            // a name is looked up in its own file first
+            let known = [functions.as_slice(), &of_crate].concat();
+            found.extend(in_file(&functions, &known, path.trim_end_matches("::mod"))?);
         }
     }
     let guards = repository.join("crates/xtask/src/prove/guards.rs");
-    found.extend(in_file(&source::read(repository, &guards)?, "guards"));
+    let functions = source::read(repository, &guards)?;
+    found.extend(in_file(&functions, &functions, "guards")?);
     paired(&found)?;
     Ok(found)
 }
 
-fn in_file(functions: &[Function], module: &str) -> Vec<Harness> {
+fn in_file(functions: &[Function], known: &[Function], module: &str) -> Result<Vec<Harness>, String> {
     let marked = functions.iter().filter(|f| f.has("kani::proof"));
     marked
-        .map(|f| Harness {
-            function: f.clone(),
-            path: format!("{module}::{}", f.name),
-            covers: source::covers(f, functions).into_iter().collect(),
+        .map(|f| {
+            let guard = module == "guards";
+            let assumptions = if guard { Vec::new() } else { source::assumptions(f, known)? };
+            if !guard && f.name.starts_with("proof_") && source::subjects(&f.doc).is_empty() {
+                return Err(format!("{}:{}: {} links to no function", f.file.display(), f.line, f.name));
+            }
+            let assumptions = assumptions.into_iter().map(|(kind, text)| Assumption { kind: kind.to_owned(), text });
+            Ok(Harness {
+                function: f.clone(),
+                path: format!("{module}::{}", f.name),
+                covers: source::covers(f, known).into_iter().collect(),
+                assumptions: assumptions.collect(),
+            })
         })
         .collect()
 }
@@ -128,7 +208,7 @@ pub(crate) fn results_file(repository: &Path) -> std::path::PathBuf {
     repository.join("target/prove/results.json")
 }
 
-/// Proves all harnesses, or those whose name contains `only` together with the guards.
+/// Proves all harnesses; or tries those whose name contains `only`, without the guards and without leaving a result.
 pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     let started = Instant::now();
     let repository = crate::repository();
@@ -138,19 +218,19 @@ pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     let folder = compile::compile(&repository, &root, &all)?;
     println!("compiled {} harnesses in {:.0} s", all.len(), started.elapsed().as_secs_f64());
 
-    let claim = |h: &Harness| h.function.name.split_once('_').map_or_else(String::new, |(_, claim)| claim.to_owned());
-    let asked: Vec<&Harness> = all
-        .iter()
-        .filter(|h| only.is_none_or(|text| claim(h).contains(text) || claim(h).starts_with("guard_")))
-        .collect();
+    let asked: Vec<Job<'_>> =
+        all.iter().filter(|h| only.is_none_or(|text| h.claim().contains(text))).flat_map(Job::of).collect();
     let answers = ask_all(&root, &folder, &asked);
     let mut proofs = Vec::new();
-    for proof in asked.iter().filter(|h| h.function.name.starts_with("proof_")) {
-        let twin_name = format!("twin_{}", claim(proof));
-        let (Some(answer), Some(twin)) = (answers.get(&proof.function.name), answers.get(&twin_name)) else {
-            return Err(format!("{} or its twin was not run", proof.function.name));
+    for job in asked.iter().filter(|job| job.harness.function.name.starts_with("proof_")) {
+        let name = job.harness.function.name.as_str();
+        let twin_name = format!("twin_{}", job.harness.claim());
+        let twin = asked.iter().find(|t| t.harness.function.name == twin_name && t.solver == job.solver);
+        let (Some(answer), Some(twin)) = (answers.get(&job.key()), twin.and_then(|twin| answers.get(&twin.key())))
+        else {
+            return Err(format!("{name} or its twin was not run"));
         };
-        proofs.push(result(proof, answer, &twin_name, twin));
+        proofs.push(result(job, answer, &twin_name, twin));
     }
     proofs.sort_by(|a, b| a.name.cmp(&b.name));
     let results = Results {
@@ -160,7 +240,7 @@ pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
         proofs,
     };
     print(&results);
-    let sound = results.proofs.iter().all(|p| p.status == "passed" && p.twin == "rejected");
+    let sound = results.proofs.iter().all(|p| p.status == "passed" && p.twin == "rejected" && p.cover == "reached");
     let file = results_file(&repository);
     // a part of the harnesses is no result for the audit
     if only.is_none() {
@@ -171,25 +251,26 @@ pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     Ok(sound && !results.proofs.is_empty())
 }
 
-fn ask_all(root: &root::Root, folder: &Path, asked: &[&Harness]) -> BTreeMap<String, Answer> {
+fn ask_all<'a>(root: &root::Root, folder: &Path, asked: &[Job<'a>]) -> BTreeMap<(&'a str, &'a str), Answer> {
     let next = AtomicUsize::new(0);
     let answers = Mutex::new(BTreeMap::new());
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
-                while let Some(h) = asked.get(next.fetch_add(1, Ordering::Relaxed)) {
+                while let Some(job) = asked.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let h = job.harness;
                     let query = Query {
                         name: &h.function.name,
                         covers: h.covers.iter().map(String::as_str).collect(),
                         unwind: h.function.argument("kani::unwind").unwrap_or(engine::UNWIND),
-                        solver: h.function.argument("kani::solver").unwrap_or("minisat"),
+                        solver: job.solver,
                         timeout: Duration::from_secs(TIMEOUT_S),
                     };
                     let answer = engine::ask(root, folder, &query);
-                    println!("{:>7.1} s  {}", answer.seconds, h.function.name);
+                    println!("{:>7.1} s  {} ({})", answer.seconds, h.function.name, job.solver);
                     if let Ok(mut answers) = answers.lock() {
-                        answers.insert(h.function.name.clone(), answer);
+                        answers.insert(job.key(), answer);
                     }
                 }
             });
@@ -198,7 +279,8 @@ fn ask_all(root: &root::Root, folder: &Path, asked: &[&Harness]) -> BTreeMap<Str
     answers.into_inner().unwrap_or_default()
 }
 
-fn result(proof: &Harness, answer: &Answer, twin_name: &str, twin: &Answer) -> ProofResult {
+fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> ProofResult {
+    let proof = job.harness;
     let covers: Vec<_> = proof.covers.iter().map(String::as_str).collect();
     let verdict = answer.verdict(&covers);
     let twin_verdict = twin.verdict(&covers);
@@ -210,11 +292,28 @@ fn result(proof: &Harness, answer: &Answer, twin_name: &str, twin: &Answer) -> P
     if twin_verdict != rejected {
         details.push(format!("twin: {twin_verdict:?}"));
     }
+    let f = &proof.function;
+    let package = proof.path.split("::").next().unwrap_or_default().replace('_', "-");
+    let scalar = ["f32", "f64"].into_iter().find(|scalar| f.name.ends_with(scalar)).unwrap_or_default();
     ProofResult {
-        name: proof.function.name.clone(),
+        name: f.name.clone(),
+        package: if proof.is_guard() { "xtask".to_owned() } else { package },
+        place: format!("{}:{}", f.file.display(), f.line),
+        claim: f.doc.clone(),
+        functions: source::subjects(&f.doc),
+        requirements: f.citations.iter().map(|c| c.target.clone()).collect(),
+        scalar: scalar.to_owned(),
+        solver: job.solver.to_owned(),
+        assumptions: proof.assumptions.clone(),
         status: if verdict == Verdict::Proved { "passed" } else { "failed" }.to_owned(),
         twin: if twin_verdict == rejected { "rejected" } else { "accepted" }.to_owned(),
-        covers: covers.len() + 1,
+        covers: proof.covers.clone(),
+        cover: match &verdict {
+            Verdict::Proved => "reached",
+            Verdict::Vacuous(_) => "missed",
+            _ => "unknown",
+        }
+        .to_owned(),
         seconds: answer.seconds,
         twin_seconds: twin.seconds,
         details: details.join("; "),
@@ -222,14 +321,14 @@ fn result(proof: &Harness, answer: &Answer, twin_name: &str, twin: &Answer) -> P
 }
 
 fn print(results: &Results) {
-    println!("\n{:<58} {:>7} {:>9} {:>9} {:>7}", "proof", "result", "twin", "covers", "s");
+    println!("\n{:<58} {:>7} {:>9} {:>9} {:>7}", "proof", "result", "twin", "cover", "s");
     for p in &results.proofs {
         println!(
             "{:<58} {:>7} {:>9} {:>9} {:>7.1}{}",
-            p.name,
+            if p.name.starts_with("proof_guard_") { format!("{} ({})", p.name, p.solver) } else { p.name.clone() },
             p.status,
             p.twin,
-            p.covers,
+            p.cover,
             p.seconds + p.twin_seconds,
             if p.details.is_empty() { String::new() } else { format!("  {}", p.details) }
         );

@@ -7,10 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const PACKAGES: [&str; 6] = ["cbmc", "cadical", "wabt", "rustc", "libstd-rust-dev-wasm32", "lld"];
-const TOOLS: [&str; 5] = ["cbmc", "cadical", "wasm2c", "rustc", "wasm-ld"];
+const PACKAGES: [&str; 6] = ["cbmc", "bitwuzla", "wabt", "rustc", "libstd-rust-dev-wasm32", "lld"];
+const TOOLS: [&str; 5] = ["cbmc", "bitwuzla", "wasm2c", "rustc", "wasm-ld"];
 /// Changes when the recipe does: an older folder is made anew.
-const RECIPE: &str = "1";
+const RECIPE: &str = "2";
 
 /// The tools, ready to run.
 #[derive(Clone, Debug)]
@@ -19,9 +19,14 @@ pub(crate) struct Root {
 }
 
 impl Root {
+    /// The folder with the tools.
+    pub(crate) fn tools(&self) -> PathBuf {
+        self.folder.join("bin")
+    }
+
     /// The path of a tool.
     pub(crate) fn tool(&self, name: &str) -> PathBuf {
-        self.folder.join("bin").join(name)
+        self.tools().join(name)
     }
 
     /// The folder with the headers of wasm2c's output.
