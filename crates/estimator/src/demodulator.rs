@@ -21,7 +21,7 @@ use crate::{ConfigError, Status};
 /// The demodulator's configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demodulator<T> {
-    samples: u16,
+    samples: u32,
     per_sample: T,
     half_samples: T,
     full_scale_v: T,
@@ -42,7 +42,7 @@ pub struct Window<T> {
     /// the last samples of both channels
     pub last: (T, T),
     /// samples so far
-    pub count: u16,
+    pub count: u32,
     /// samples of either channel that were no finite number
     pub invalid: u16,
     /// samples of either channel at the end of the converter's range
@@ -95,7 +95,7 @@ impl<T: Float> Demodulator<T> {
             return Err(ConfigError { parameter: "full_scale_v", expected: "between 1e-9 and 1e9" });
         }
         Ok(Self {
-            samples,
+            samples: u32::from(samples),
             per_sample: T::from_f64(1.0 / f64::from(samples)),
             half_samples: T::from_f64(0.5 * f64::from(samples)),
             full_scale_v: T::from_f64(full_scale_v),
@@ -104,7 +104,7 @@ impl<T: Float> Demodulator<T> {
     }
 
     /// Samples a window.
-    pub fn samples(&self) -> u16 {
+    pub fn samples(&self) -> u32 {
         self.samples
     }
 
@@ -113,15 +113,28 @@ impl<T: Float> Demodulator<T> {
         0.5 * (f64::from(self.samples) - 1.0)
     }
 
-    /// Adds one sample of each channel, taken at the phase of `phasor`; true when the window is full.
-    #[inline(always)]
+    /// Adds one sample of each channel, taken at the phase of `phasor`; true when the window is full. Total.
+    #[inline]
     pub fn accumulate(&self, window: &mut Window<T>, x: T, y: T, phasor: &Phasor<T>) -> bool {
-        let (mut x, mut y) = (x, y);
-        // false for NaN
-        if !(x < self.clip_v && x > -self.clip_v && y < self.clip_v && y > -self.clip_v) {
-            x = self.admit(window, x);
-            y = self.admit(window, y);
+        let (x, y) = if self.takes(x, y) { (x, y) } else { self.admit(window, x, y) };
+        let full = self.add(window, x, y, phasor);
+        if full {
+            window.last = (x, y);
         }
+        full
+    }
+
+    /// Both are numbers and below the end of the converter's range.
+    #[inline(always)]
+    pub fn takes(&self, x: T, y: T) -> bool {
+        // false for NaN
+        x.magnitude() < self.clip_v && y.magnitude() < self.clip_v
+    }
+
+    /// [`Demodulator::accumulate`] for samples that it [takes](Demodulator::takes), but for [`Window::last`], which is
+    /// left to whoever finishes the window.
+    #[inline(always)]
+    pub fn add(&self, window: &mut Window<T>, x: T, y: T, phasor: &Phasor<T>) -> bool {
         window.mixed.x_c = window.mixed.x_c + x * phasor.cos;
         window.mixed.x_s = window.mixed.x_s + x * phasor.sin;
         window.mixed.y_c = window.mixed.y_c + y * phasor.cos;
@@ -129,26 +142,25 @@ impl<T: Float> Demodulator<T> {
         window.x = window.x + x;
         window.y = window.y + y;
         window.count = window.count.wrapping_add(1);
-        let full = window.count >= self.samples;
-        if full {
-            window.last = (x, y);
-        }
-        full
+        window.count >= self.samples
     }
 
-    /// A sample that is at the end of the range or no number: counted, and made a number within the range.
+    /// Samples of which one is at the end of the range or no number: counted, and made numbers within the range.
     #[cold]
     #[inline(never)]
-    fn admit(&self, window: &mut Window<T>, v: T) -> T {
-        if !v.is_finite() {
-            window.invalid = window.invalid.saturating_add(1);
-            T::zero()
-        } else if v.magnitude() >= self.clip_v {
-            window.clipped = window.clipped.saturating_add(1);
-            v.bounded(self.full_scale_v)
-        } else {
-            v
-        }
+    pub fn admit(&self, window: &mut Window<T>, x: T, y: T) -> (T, T) {
+        let mut one = |v: T| {
+            if !v.is_finite() {
+                window.invalid = window.invalid.saturating_add(1);
+                T::zero()
+            } else if v.magnitude() >= self.clip_v {
+                window.clipped = window.clipped.saturating_add(1);
+                v.bounded(self.full_scale_v)
+            } else {
+                v
+            }
+        };
+        (one(x), one(y))
     }
 
     //= specs/dsp.md#carrier-rejection

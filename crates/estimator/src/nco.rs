@@ -44,6 +44,13 @@ impl<T: Float> Phasor<T> {
         }
     }
 
+    /// Moves on to the next sample.
+    #[inline(always)]
+    pub fn advance(&mut self) {
+        let next = self.advanced();
+        (self.cos, self.sin) = (next.cos, next.sin);
+    }
+
     /// The phasor moved ahead by the angle of (`cos`, `sin`).
     #[inline]
     pub fn turned(&self, cos: T, sin: T) -> Self {

@@ -33,6 +33,8 @@ pub struct State<T> {
     pub supervisor: SupervisorState,
     /// control steps made
     pub windows: u32,
+    /// what the last control step said; never `fresh` here
+    pub status: Status,
 }
 
 /// What was measured and commanded in one control step.

@@ -28,6 +28,7 @@ impl<T: Float> Instrument<T> {
             fingerprint: [T::zero(); 4],
             supervisor: SupervisorState::default(),
             windows: 0,
+            status: Status::default(),
         }
     }
 
@@ -38,23 +39,56 @@ impl<T: Float> Instrument<T> {
     /// Total: any bit pattern in; out come finite values within ±`dac_limit_v`.
     #[inline]
     pub fn step(&self, state: &mut State<T>, adc_x: T, adc_y: T) -> (T, T, Status) {
-        let now = state.phasor;
-        let full = self.demodulator.accumulate(&mut state.window, adc_x, adc_y, &now);
-        state.phasor = now.advanced();
-        let mut status = Status {
-            mode: state.supervisor.mode,
-            fault: state.supervisor.fault_now(),
-            fresh: false,
-            clipped: state.window.clipped > 0,
-            valid: state.window.invalid == 0,
-        };
-        if full {
-            status = self.control(state);
+        if self.demodulator.takes(adc_x, adc_y) {
+            self.sample(state, adc_x, adc_y)
+        } else {
+            self.sample_beyond(state, adc_x, adc_y)
         }
+    }
+
+    /// A sample within the converters' range. What is rare is a call at its end, so that nothing has to be kept over it.
+    #[inline(always)]
+    fn sample(&self, state: &mut State<T>, x: T, y: T) -> (T, T, Status) {
+        let now = state.phasor;
+        let full = self.demodulator.add(&mut state.window, x, y, &now);
+        state.phasor.advance();
+        if full { self.last(state, x, y, now.cos, now.sin) } else { self.put_out(state, now.cos, now.sin) }
+    }
+
+    /// A sample at the end of the converters' range, or one that is no number.
+    #[cold]
+    #[inline(never)]
+    fn sample_beyond(&self, state: &mut State<T>, x: T, y: T) -> (T, T, Status) {
+        let (x, y) = self.demodulator.admit(&mut state.window, x, y);
+        self.sample(state, x, y)
+    }
+
+    /// The last sample of a window, taken at the phase of (`cos`, `sin`).
+    #[inline(never)]
+    fn last(&self, state: &mut State<T>, x: T, y: T, cos: T, sin: T) -> (T, T, Status) {
+        state.window.last = (x, y);
+        state.status = self.control(state);
+        let (x, y, status) = self.put_out(state, cos, sin);
+        (x, y, Status { fresh: true, ..status })
+    }
+
+    /// The drives at the phase of (`cos`, `sin`).
+    #[inline(always)]
+    fn put_out(&self, state: &State<T>, cos: T, sin: T) -> (T, T, Status) {
         let d = &state.drive;
-        let dac_x = (d.x_c * now.cos + d.x_s * now.sin).bounded(self.dac_limit_v);
-        let dac_y = (d.y_c * now.cos + d.y_s * now.sin).bounded(self.dac_limit_v);
-        (dac_x, dac_y, status)
+        let (x, y) = (d.x_c * cos + d.x_s * sin, d.y_c * cos + d.y_s * sin);
+        // false for NaN
+        if x.magnitude() <= self.dac_limit_v && y.magnitude() <= self.dac_limit_v {
+            (x, y, state.status)
+        } else {
+            self.limited(state, x, y)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn limited(&self, state: &State<T>, x: T, y: T) -> (T, T, Status) {
+        (x.bounded(self.dac_limit_v), y.bounded(self.dac_limit_v), state.status)
     }
 
     /// The control step, after the last sample of a window.
@@ -98,7 +132,7 @@ impl<T: Float> Instrument<T> {
         Status {
             mode: state.supervisor.mode,
             fault: state.supervisor.fault_now(),
-            fresh: true,
+            fresh: false,
             clipped: measured.clipped > 0,
             valid,
         }

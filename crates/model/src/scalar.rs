@@ -149,6 +149,10 @@ macro_rules! machine_float {
             fn floor(self) -> Self {
                 $floor(self)
             }
+            #[inline]
+            fn magnitude(self) -> Self {
+                self.abs()
+            }
         }
     };
 }

@@ -54,7 +54,9 @@ impl Converter {
     /// The nearest value the converter has.
     #[inline]
     pub fn convert(&self, volts: f64) -> f64 {
-        let within = volts.max(-self.range_v).min(self.range_v);
+        // two comparisons; `max` and `min` would ask for NaN as well
+        let above = if volts < -self.range_v { -self.range_v } else { volts };
+        let within = if above > self.range_v { self.range_v } else { above };
         if self.step_v > 0.0 { ((within * self.per_step + ROUND) - ROUND) * self.step_v } else { within }
     }
 }

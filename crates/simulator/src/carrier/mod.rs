@@ -128,11 +128,12 @@ impl<T: Float> CarrierLoop<T> {
         self.output_v
     }
 
-    /// What the converters read now, V.
+    /// What the converters read in the state `vibration`, V.
     #[inline]
-    pub fn readout(&mut self) -> [f64; 2] {
-        // late: the displacement as it was
-        let [x, y] = self.plant.displacement_at(self.late_cos, -self.late_sin);
+    fn readout(&mut self, [x, y, p_x, p_y]: [f64; 4]) -> [f64; 2] {
+        // late: the displacement as it was a part of a period ago, but for what losses, splits and rates do in it
+        let x = self.late_cos * x - self.late_sin * p_x;
+        let y = self.late_cos * y - self.late_sin * p_y;
         let volts = [self.plates[0].volts(x) + self.offset_v[0], self.plates[1].volts(y) + self.offset_v[1]];
         self.noise.add(volts).map(|v| self.adc.convert(v))
     }
@@ -147,18 +148,20 @@ impl<T: Float> CarrierLoop<T> {
     /// V, the electronics see.
     #[inline]
     pub fn step_through(&mut self, channel: impl FnOnce([T; 2]) -> [T; 2]) -> Status {
-        let readings = self.readout().map(T::from_f64);
+        // copies: the call of the electronics then does not force them to memory and back
+        let (vibration, before) = (self.plant.state(), self.output_v);
+        let readings = self.readout(vibration).map(T::from_f64);
         let [x, y] = channel(readings);
         let (dac_x, dac_y, status) = self.instrument.step(&mut self.state, x, y);
         let next = [self.dac.convert(dac_x.to_f64()), self.dac.convert(dac_y.to_f64())];
-        self.plant.step(self.output_v, next);
+        self.plant.step_from(vibration, before, next);
         self.output_v = next;
         status
     }
 
     /// One sample in which the electronics stand still and the drives hold their output.
     pub fn step_without_electronics(&mut self) {
-        let _ = self.readout();
+        let _ = self.readout(self.plant.state());
         self.plant.step(self.output_v, self.output_v);
     }
 }

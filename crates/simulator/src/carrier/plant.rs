@@ -86,7 +86,19 @@ impl CarrierPlant {
     /// One sample at the rate that is set: the drives hold `before` until their output changes, then `after`, V.
     #[inline]
     pub fn step(&mut self, before: [f64; 2], after: [f64; 2]) {
-        self.vibration = self.at_rate.apply(&self.vibration, before, after);
+        self.step_from(self.vibration, before, after);
+    }
+
+    /// The same from a copy of the state that was taken before: whoever read it has it in registers.
+    #[inline]
+    pub(super) fn step_from(&mut self, vibration: [f64; 4], before: [f64; 2], after: [f64; 2]) {
+        self.vibration = self.at_rate.apply(&vibration, before, after);
+    }
+
+    /// The state (x, y, p_x/ω, p_y/ω).
+    #[inline]
+    pub(super) fn state(&self) -> [f64; 4] {
+        self.vibration
     }
 
     /// One sample in which the rate is `rate_rad_s` on average, whatever it was before.
@@ -120,18 +132,16 @@ impl CarrierPlant {
         [cos * x + sin * y, cos * y - sin * x, cos * k_x + sin * k_y, cos * k_y - sin * k_x]
     }
 
+    /// The matrices of a sample at the rate that is set, by columns: on the state (x, y, p_x/ω, p_y/ω), on the voltages
+    /// before the outputs change, and after.
+    pub fn matrices(&self) -> ([[f64; 4]; 4], [[f64; 4]; 2], [[f64; 4]; 2]) {
+        (self.at_rate.free, self.at_rate.before, self.at_rate.after)
+    }
+
     /// Displacements of x and y.
     #[inline]
     pub fn displacement(&self) -> [f64; 2] {
         [self.vibration[0], self.vibration[1]]
-    }
-
-    /// Displacements `ahead` rad of the carrier's phase later (earlier where negative): for delays of a fraction of a
-    /// sample, exact but for what losses, splits and rates do in it.
-    #[inline]
-    pub fn displacement_at(&self, cos: f64, sin: f64) -> [f64; 2] {
-        let [x, y, p_x, p_y] = self.vibration;
-        [cos * x + sin * p_x, cos * y + sin * p_y]
     }
 
     /// The vibration as an envelope at the phase of this instant: its energy, quadrature and pattern angle are those of
