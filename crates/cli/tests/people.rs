@@ -7,7 +7,6 @@ mod support;
 use std::ffi::OsStr;
 use std::fs;
 use std::io::Write as _;
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 use cvg_model::effects::EffectId;
@@ -151,13 +150,6 @@ fn the_library_is_listed_as_its_descriptions_tell_it() {
     let refused = cvg(&["effects", "gremlins"]);
     assert_eq!(refused.status, 2);
     assert!(refused.stderr.contains("gremlins") && refused.stderr.contains("detection-cubic"), "{}", refused.stderr);
-}
-
-#[test]
-fn the_effects_page_of_the_book_is_what_the_library_prints() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/effects.md");
-    let written = fs::read_to_string(page).unwrap();
-    assert!(written == cvg_ok(&["effects", "--markdown"]), "cvg effects --markdown > docs/src/effects.md");
 }
 
 #[test]
