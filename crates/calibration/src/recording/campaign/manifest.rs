@@ -129,7 +129,7 @@ impl Text<'_> {
         let Some(table) = columns.get_ref().as_table() else {
             return Err(self.refuse(columns.span(), "`columns` is not a table", WANTED));
         };
-        for (channel, column) in table.iter() {
+        for (channel, column) in table {
             let name = self.string(column, channel.get_ref())?;
             naming
                 .add(&format!("{}={name}", channel.get_ref()))
