@@ -27,6 +27,7 @@
     const dark = name === "dark";
     const [fg, grid] = dark ? ["#ececec", "#343a40"] : ["#1a1a1a", "#e4e4e4"];
     const layout = inked(figure.layout, inks[name]);
+    const traces = inked(figure.traces, inks[name]);
     for (const key of Object.keys(layout))
       if (/^[xy]axis/.test(key))
         layout[key] = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, ...layout[key] };
@@ -34,9 +35,10 @@
     if (figure.id === "correlations" && (width || innerWidth) < NARROW_PX) {
       layout.xaxis = { ...layout.xaxis, showticklabels: false };
       layout.margin = { l: 150, r: 8, t: 16, b: 24 };
+      traces[0].showscale = false;
     }
     return {
-      traces: inked(figure.traces, inks[name]),
+      traces,
       layout: {
         margin: { l: 64, r: 16, t: 16, b: 48 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { color: fg, family: "system-ui, sans-serif", size: 13 }, hovermode: "closest",
