@@ -49,6 +49,9 @@ try {
       assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), scheme);
       const empty = await page.$$eval(".plot", (all) => all.filter((p) => !p.querySelector("svg .trace, svg .hm")).map((p) => p.id));
       assert.deepEqual(empty, [], `${width} ${scheme}: figures without anything drawn`);
+      const scale = await page.$$eval("#plot-correlations", (all) => all.map((p) => p._fullData[0].colorscale.map((c) => c[1])));
+      assert.ok(scale.flat().every((ink) => /^(#|rgb)/.test(ink)), `${width} ${scheme}: colours ${scale}`);
+      assert.ok(scale.every((inks) => inks[0] === "#d55e00"), `${width} ${scheme}: not the report's own colours: ${scale}`);
       const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
       assert.ok(overflow <= 0, `${width} ${scheme}: the page is ${overflow} px too wide`);
       await page.screenshot({ path: `${folder}/${scheme}-${width}.png`, fullPage: true });

@@ -15,6 +15,20 @@
 //! }
 //! ```
 //!
+//! A recording can come from anywhere that gives bytes, with columns by any name:
+//!
+//! ```
+//! use cvg_calibration::recording::{Naming, Recording};
+//!
+//! let mut naming = Naming::default();
+//! naming.add("t_s=Time (ms)*0.001").expect("a channel and a column");
+//! let text = "Time (ms);rate_dps;theta_deg\n0;10;0,0\n100;10;0,78\n200;10;1,56\n";
+//! let recording = Recording::read_from(text.as_bytes(), &naming, "export.csv".as_ref())?;
+//! assert_eq!(recording.t_s, [0.0, 0.1, 0.2]);
+//! assert!(recording.require_rotation().is_ok());
+//! # Ok::<(), cvg_calibration::recording::ReadError>(())
+//! ```
+//!
 //! [`recording`] reads files, [`identify()`] answers, [`calibration`] keeps the answer, [`compensate()`] puts it to use.
 //! This crate knows nothing of the simulator, and renders nothing.
 #![forbid(unsafe_code)]

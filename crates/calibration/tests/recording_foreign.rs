@@ -32,6 +32,41 @@ fn a_lock_ins_export_is_read_with_its_names_mapped() {
     assert!(recording.require_rotation().is_ok());
 }
 
+/// A folder with a campaign of this `[columns]` table and the export of a lock-in.
+fn lock_in_campaign(columns: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("[campaign]\ndevice = \"d\"\n{columns}\n[[run]]\nkind = \"rotation\"\nfile = \"a.csv\"\n");
+    std::fs::write(folder.path().join("campaign.toml"), text).unwrap();
+    std::fs::write(folder.path().join("a.csv"), LOCK_IN).unwrap();
+    folder
+}
+
+#[test]
+fn a_campaign_says_once_what_its_columns_are_called() {
+    let folder =
+        lock_in_campaign("[columns]\nt_s = \"Time (ms)*0.001\"\nxc_v = \"Ch1\"\nyc_v = \"Ch2\"\ntable_deg = \"Table\"");
+    let path = folder.path().join("campaign.toml");
+    let campaign = Campaign::open(&path).unwrap();
+    assert_eq!(campaign.runs[0].recording.t_s, [0.0, 0.01, 0.02]);
+    // what the caller says stands over what the file says
+    let swapped = Campaign::open_named(&path, &naming(&["xc_v=Ch2", "yc_v=Ch1"])).unwrap();
+    assert_eq!(swapped.runs[0].recording.xc_v.as_deref(), Some(&[0.0, 0.1, 0.2][..]));
+    assert!(Campaign::columns(&path).unwrap() != Naming::default());
+}
+
+#[test]
+fn columns_that_cannot_be_meant_are_refused_with_their_place() {
+    for (columns, parts) in [
+        ("[columns]\nangle = \"Ch1\"", ["line 4, column 1", "`angle` is no channel"]),
+        ("[columns]\nxc_v = 1", ["line 4, column 8", "is not a string"]),
+        ("[columns]\nxc_v = \"Ch1\"\nyc_v = \"ch1\"", ["line 5", "mapped twice"]),
+    ] {
+        let folder = lock_in_campaign(columns);
+        let said = Campaign::open(&folder.path().join("campaign.toml")).unwrap_err().to_string();
+        assert!(parts.iter().all(|part| said.contains(part)), "{columns}: {said}");
+    }
+}
+
 #[test]
 fn a_remark_does_not_move_the_lines_that_errors_name() {
     let text = "t_s,theta_deg\n0,1\n# pause\n0.1,x\n";

@@ -1,10 +1,12 @@
 //! The command line: commands, options, help with examples.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
-use cvg_calibration::recording::Naming;
+use cvg_calibration::recording::{Campaign, Naming};
+
+use crate::input;
 
 /// Find, explain and remove the angle errors of whole-angle gyroscopes and sin/cos sensors.
 #[derive(Parser)]
@@ -45,7 +47,8 @@ const COMPENSATE: &str = "\
 Examples:
   cvg compensate results/calibration.toml rot.csv --out clean.csv
   cvg compensate results/calibration.toml rot.parquet --out clean.parquet
-  cvg compensate results/calibration.toml - --out clean.csv < rot.csv";
+  cvg compensate results/calibration.toml - --out clean.csv < rot.csv
+  cvg compensate results/calibration.toml export.csv --map campaign.toml --out clean.csv";
 
 const COMPLETIONS: &str = "\
 Examples:
@@ -56,7 +59,8 @@ Examples:
 /// What the columns of foreign files mean.
 #[derive(Args, Clone, Default)]
 pub(crate) struct Mapping {
-    /// Which column is which channel, for files with names of their own; a factor takes its unit to the channel's
+    /// Which column is which channel, for files with names of their own; a factor takes its unit to the channel's. Or a
+    /// campaign.toml whose [columns] say it
     #[arg(long = "map", value_name = "CHANNEL=COLUMN[*FACTOR]")]
     entries: Vec<String>,
 }
@@ -64,11 +68,16 @@ pub(crate) struct Mapping {
 impl Mapping {
     /// The names, or what is wrong with them.
     pub(crate) fn naming(&self) -> Result<Naming, crate::Failure> {
-        let mut naming = Naming::default();
+        let (mut naming, mut filed) = (Naming::default(), Naming::default());
         for entry in &self.entries {
-            naming.add(entry).map_err(|e| crate::Failure::input(format!("--map: {e}")))?;
+            let path = Path::new(entry);
+            if !entry.contains('=') && input::is_campaign(path) {
+                filed = Campaign::columns(path)?.over(&filed);
+            } else {
+                naming.add(entry).map_err(|e| crate::Failure::input(format!("--map: {e}")))?;
+            }
         }
-        Ok(naming)
+        Ok(naming.over(&filed))
     }
 }
 

@@ -1,18 +1,15 @@
 //! What each command does.
 
-use std::cell::RefCell;
-use std::io::IsTerminal;
 use std::path::Path;
-use std::time::Duration;
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::{Campaign, Naming};
 use cvg_calibration::{Identification, Options};
 use cvg_simulator::{Scenario, ScenarioError};
-use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::Arguments;
+use crate::progress::Progress;
 use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
@@ -22,7 +19,10 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     let parsed = Scenario::parse(&text)
         .map_err(|e| Failure::input(format!("{}: {}", scenario.display(), scenario_problem(&e, &text))))?;
     output::check_folder(out)?;
+    let progress = Progress::begin();
+    progress.say("simulating");
     parsed.simulate().write(out).map_err(Failure::input)?;
+    drop(progress);
     eprintln!("wrote {}", out.join("campaign.toml").display());
     Ok(())
 }
@@ -57,30 +57,13 @@ pub(crate) fn identify(
     Ok(())
 }
 
-/// Identifies a campaign, with a spinner where a person is watching.
+/// Identifies a campaign, and says what is being done where a person is waiting.
 pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Identification, Failure> {
-    let bar = RefCell::new(None::<ProgressBar>);
-    let started = std::time::Instant::now();
-    let show = |what: &str| {
-        let watched = std::io::stderr().is_terminal() && started.elapsed() > Duration::from_millis(500);
-        let mut bar = bar.borrow_mut();
-        if bar.is_none() && watched {
-            let spinner = ProgressBar::new_spinner();
-            spinner.set_style(ProgressStyle::default_spinner());
-            spinner.enable_steady_tick(Duration::from_millis(100));
-            *bar = Some(spinner);
-        }
-        if let Some(bar) = &*bar {
-            bar.set_message(what.to_owned());
-        }
-    };
-    show("reading");
+    let progress = Progress::begin();
+    progress.say("reading");
     let opened = open()?;
-    let identified = cvg_calibration::identify_with_picture(opened, &Options { discover: true, progress: &show });
-    if let Some(bar) = bar.borrow_mut().take() {
-        bar.finish_and_clear();
-    }
-    Ok(identified?)
+    let options = Options { discover: true, progress: &|what| progress.say(what) };
+    Ok(cvg_calibration::identify_with_picture(opened, &options)?)
 }
 
 /// Writes report.json, report.html and calibration.toml: all of them, or none.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Naming, ReadError, Recording, Role};
+use cvg_calibration::recording::{Campaign, Channel, Naming, ReadError, Recording, Role};
 
 use crate::Failure;
 
@@ -83,6 +83,13 @@ pub(crate) fn campaign(
     }
     let read: Vec<Recording> =
         fitted.iter().chain(&held).map(|path| recording(path, naming)).collect::<Result<_, _>>()?;
+    if let Some(still) = read.iter().find(|r| read.len() > 1 && stands_still(r)) {
+        return Err(Failure::input(format!(
+            "{}: the table does not turn, so it is no rotation; a ring-down has its place in a campaign.toml, with the \
+             angle at which the pattern was held",
+            still.source.display()
+        )));
+    }
     let mut campaign = Campaign::of_recordings(read).map_err(explained)?;
     for (number, run) in campaign.runs.iter_mut().enumerate() {
         run.settle_s = settle_s;
@@ -94,9 +101,23 @@ pub(crate) fn campaign(
     Ok(campaign)
 }
 
+/// Whether the input is recorded and never anything but the same.
+fn stands_still(recording: &Recording) -> bool {
+    let rates = recording.rate_dps.as_deref().is_some_and(|v| v.iter().all(|rate| *rate == 0.0 || rate.is_nan()));
+    let table = recording.table_deg.as_deref();
+    table.map_or(rates, |v| v.iter().all(|angle| Some(angle) == v.first() || angle.is_nan()))
+}
+
 /// What would mend it, where the command line can.
 pub(crate) fn explained(error: ReadError) -> Failure {
-    let foreign = matches!(error, ReadError::MissingColumns { .. } | ReadError::MappedColumn { .. });
-    let hint = if foreign { "; columns with other names are mapped, as in --map theta_deg=Ch3" } else { "" };
-    Failure::input(format!("{error}{hint}"))
+    let (ReadError::MissingColumns { present, .. } | ReadError::MappedColumn { present, .. }) = &error else {
+        return Failure::input(error);
+    };
+    let known = |name: &str| Channel::ALL.iter().any(|c| c.name().eq_ignore_ascii_case(name));
+    let foreign = present.split('`').skip(1).step_by(2).find(|name| !known(name)).unwrap_or("Ch3");
+    let channel = if foreign.to_lowercase().starts_with('t') { "t_s" } else { "theta_deg" };
+    Failure::input(format!(
+        "{error}; say which column is which, as in --map '{channel}={foreign}', or once for all in the [columns] of a \
+         campaign.toml"
+    ))
 }

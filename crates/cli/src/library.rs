@@ -63,6 +63,10 @@ fn scaling(s: Scaling) -> String {
         -1 => format!("∝ 1/{of}"),
         n => format!("∝ {of}^{n}"),
     };
+    if (s.rate, s.amplitude) == (0, 0) {
+        let odd = if s.odd_in_rate { "; its sign follows the rate's" } else { "" };
+        return format!("independent of rate and amplitude{odd}");
+    }
     let odd = if s.odd_in_rate { ", its sign follows the rate's" } else { "" };
     format!("{}, {}{odd}", power("rate", s.rate), power("amplitude", s.amplitude))
 }
@@ -132,7 +136,9 @@ fn page() -> String {
 
 const LOOK_ALIKES: &str = "
 *Declared* effects are the paper's model. *Discovered* ones are taken from the library where the residual asks for them.
-The *empirical* one describes what no physical effect explains, and claims no cause.
+*Empirical* ones describe what no physical effect explains, and claim no cause; nor does a `table-harmonic` of a high or
+broken order, nor any effect that a run, the energy balance or a rival contradicts. The definitions at signal level are in
+[Theory](theory.md#the-effects-at-signal-level).
 
 ## Look-alikes
 

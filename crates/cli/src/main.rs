@@ -14,6 +14,7 @@ mod inspect;
 mod library;
 mod output;
 mod paper;
+mod progress;
 mod report;
 mod standard;
 

@@ -7,6 +7,19 @@
 //! Every running part is an immutable configuration, checked when built, and a plain state; one call of `step` joins
 //! them. A step is total: any bit pattern in, a finite and bounded command and a status out. No allocation, no panic.
 //!
+//! ```
+//! use cvg_controller::Pi;
+//!
+//! // the energy loop: gain, integration time, sample period, limit
+//! let energy = Pi::<f32>::new(1.0, 0.2, 5e-4, 10.0)?;
+//! let mut state = energy.primed(0.0);
+//! // more energy than set: a positive output takes it out
+//! assert!(energy.energy(&mut state, 1.1, 1.0).volts > 0.0);
+//! // whatever comes in, what goes out is finite and within the limit
+//! assert!(energy.energy(&mut state, f32::NAN, 1.0).volts.abs() <= 10.0);
+//! # Ok::<(), cvg_controller::ConfigError>(())
+//! ```
+//!
 //! The crate refuses to measure: it takes pendulum variables and a direction as numbers, whoever found them.
 #![no_std]
 #![forbid(unsafe_code)]

@@ -9,6 +9,19 @@
 //! Every running part is an immutable configuration, checked when built, and a plain state; one call of `step` joins
 //! them. A step is total: any bit pattern in, a finite answer and a status out. No allocation, no panic.
 //!
+//! ```
+//! use cvg_estimator::Compensation;
+//! use cvg_model::effects::{EffectId, Moment};
+//! use cvg_model::Envelope;
+//!
+//! // what an identification found, in the order of the parameters in calibration.toml
+//! let readout = Compensation::<f32, 4>::new(&[(EffectId::DetectionGainMismatch, [1.0132, 0.0, 0.0, 0.0])])?;
+//! // every control sample
+//! let vibration = readout.apply(Envelope::new(0.6, 0.0, 0.81056, 0.0), &Moment::default());
+//! assert!((vibration.y_c - 0.8).abs() < 1e-6);
+//! # Ok::<(), cvg_estimator::ConfigError>(())
+//! ```
+//!
 //! The crate refuses to command anything: what is done with a measurement is the controller's business, and the two
 //! do not know each other.
 #![no_std]

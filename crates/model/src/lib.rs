@@ -7,6 +7,24 @@
 //! Each equation is one function, generic over [`Real`]: the same source runs on `f32` in firmware, on `f64` in the
 //! simulator and the identification, and on dual numbers for derivatives.
 //!
+//! ```
+//! use cvg_model::Orbit;
+//! use cvg_model::detection::{angle_error, angle_error_bound};
+//! use cvg_model::effects::{EffectId, Moment};
+//!
+//! // Equation 7: what unequal readout gains do to the pattern angle, and how much at most
+//! let (g, theta) = (1.0132_f64, 0.5);
+//! assert!(angle_error(g, theta).abs() <= angle_error_bound(g));
+//!
+//! // the same from the library: a vibration, what the readout makes of it, and back
+//! let vibration = Orbit { a: 1.0, q: 0.0, theta, delta: 0.0 }.envelope();
+//! let (gains, now) = ([g, 0.0, 0.0, 0.0], Moment::default());
+//! let readout = EffectId::DetectionGainMismatch.read(&gains, vibration, &now);
+//! assert!((readout.pendulum().angle() - theta - angle_error(g, theta)).abs() < 1e-12);
+//! let undone = EffectId::DetectionGainMismatch.unread(&gains, readout, &now);
+//! assert!((undone.pendulum().angle() - theta).abs() < 1e-12);
+//! ```
+//!
 //! The crate refuses to know about time steps, filters, loops, files or noise: those live in the crates that depend
 //! on it.
 //!

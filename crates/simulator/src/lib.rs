@@ -10,6 +10,24 @@
 //!
 //! The same loop at the carrier, with plates, converters and the production electronics, is in [`carrier`].
 //!
+//! ```
+//! use cvg_simulator::Scenario;
+//!
+//! let scenario = Scenario::parse(r#"
+//!     device = "example"
+//!     angular_gain = 0.78
+//!     effects = [{ id = "detection-gain-mismatch", detection_gain_ratio = 1.0132 }]
+//!     [[run]]
+//!     kind = "rotation"
+//!     file = "rot+500.csv"
+//!     rate_dps = 500.0
+//!     duration_s = 1.0
+//! "#)?;
+//! let simulated = scenario.simulate();
+//! assert_eq!(simulated.runs.len(), 1);
+//! # Ok::<(), cvg_simulator::ScenarioError>(())
+//! ```
+//!
 //! The crate refuses to identify anything: what it writes is for others to find out.
 #![forbid(unsafe_code)]
 

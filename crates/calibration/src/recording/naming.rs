@@ -57,6 +57,17 @@ impl Naming {
         Ok(())
     }
 
+    /// This mapping, and that of `other` where this one says nothing.
+    #[must_use]
+    pub fn over(&self, other: &Self) -> Self {
+        let mut both = self.clone();
+        let free = |e: &&Entry| {
+            !self.entries.iter().any(|own| own.channel == e.channel || own.column.eq_ignore_ascii_case(&e.column))
+        };
+        both.entries.extend(other.entries.iter().filter(free).cloned());
+        both
+    }
+
     /// The channel of a column.
     pub(super) fn channel(&self, name: &str) -> Option<Channel> {
         let name = name.trim();
@@ -119,5 +130,17 @@ mod tests {
         assert_eq!(naming.channel("Rate_dps "), Some(Channel::Table));
         assert_eq!(naming.channel("xc_v"), Some(Channel::Xc));
         assert_eq!(naming.channel("Ch1"), None);
+    }
+
+    #[test]
+    fn what_is_said_last_stands_over_what_was_said_before() {
+        let [mut file, mut line] = [Naming::default(), Naming::default()];
+        for entry in ["t_s=Time*0.001", "xc_v=A", "yc_v=B"] {
+            file.add(entry).expect("a mapping");
+        }
+        line.add("xc_v=B").expect("a mapping");
+        let both = line.over(&file);
+        assert_eq!(both.channel("B"), Some(Channel::Xc), "B is no longer Y");
+        assert_eq!((both.channel("A"), both.channel("Time")), (None, Some(Channel::Time)));
     }
 }

@@ -113,7 +113,8 @@ fn bias(identified: &Identification) -> Figure {
     }
     let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("angle error [deg]"), "showlegend": false});
     let caption = "Angle minus the best line on held-out data, before any compensation, after the paper's model, and \
-                   after all. Switch off a stage to enlarge the others.";
+                   after all. Switch off a stage to enlarge the others. Where points of a run leave the curve, its error \
+                   changes with time too.";
     Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
 }
 
@@ -339,15 +340,21 @@ fn correlations(picture: &Picture) -> Option<Figure> {
     if c.names.len() < 2 {
         return None;
     }
+    // parameters have names of their own, the effect in front of them is not needed
+    let short = |name: &str| match name.split_once(' ') {
+        Some((id, parameter)) if EffectId::from_id(id).is_some() => parameter.to_owned(),
+        _ => name.to_owned(),
+    };
+    let names: Vec<String> = c.names.iter().map(|n| short(n)).collect();
     let rows: Vec<Value> = c.rows.iter().map(|r| shorts(r.iter().copied())).collect();
     let traces = vec![json!({
-        "type": "heatmap", "x": c.names, "y": c.names, "z": rows, "zmin": -1, "zmax": 1,
+        "type": "heatmap", "x": names, "y": names, "xgap": 1, "ygap": 1, "z": rows, "zmin": -1, "zmax": 1,
         "colorscale": [[0.0, "#d55e00"], [0.5, "@zero"], [1.0, "#0072b2"]],
         "hovertemplate": "%{x}<br>%{y}<br>%{z:.3f}<extra></extra>",
     })];
     let layout = json!({
         "xaxis": {"tickangle": -40, "showgrid": false}, "yaxis": {"autorange": "reversed", "showgrid": false},
-        "margin": {"l": 190, "r": 16, "t": 16, "b": 150},
+        "margin": {"l": 170, "r": 16, "t": 16, "b": 130},
     });
     let caption = "Of everything that was fitted. Near ±1 the data tell only a combination of the two.";
     Some(Figure::new("correlations", "Correlations", caption, traces, layout).wide())

@@ -4,6 +4,8 @@ use cvg_calibration::Origin;
 use cvg_calibration::report::{EffectReport, Report};
 use cvg_model::effects::EffectId;
 
+use crate::commands::significant;
+
 /// A residual within this factor of the noise is the noise.
 const AT_THE_NOISE: f64 = 1.2;
 /// Effects that a sentence can name.
@@ -25,6 +27,32 @@ pub(super) fn degrees(value: f64) -> String {
         6
     };
     format!("{value:.digits$}°")
+}
+
+/// Digits after the point that a value has when its deviation `half_width` keeps two digits; none for what needs an
+/// exponent.
+fn decimals(value: f64, half_width: f64) -> Option<usize> {
+    let sound = value.is_finite() && half_width.is_finite() && half_width > 0.0 && value.abs() >= 1e-3;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of the order of ten")]
+    sound.then(|| (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize)
+}
+
+/// A value as sharp as it is known, with the half width of its interval.
+pub(super) fn measured(value: f64, ci95: Option<[f64; 2]>) -> String {
+    let half_width = ci95.map(|c| 0.5 * (c[1] - c[0]));
+    match half_width.and_then(|h| Some((h, decimals(value, h)?))) {
+        Some((h, digits)) => format!("{value:.digits$} ± {h:.digits$}"),
+        None => significant(value),
+    }
+}
+
+/// A value and the ends of its interval, as sharp as they are known.
+pub(super) fn interval(value: f64, ci95: [f64; 2]) -> [String; 3] {
+    let all = [value, ci95[0], ci95[1]];
+    match decimals(value, 0.5 * (ci95[1] - ci95[0])) {
+        Some(digits) => all.map(|v| format!("{v:.digits$}")),
+        None => all.map(significant),
+    }
 }
 
 /// By how much an error became less.
@@ -75,7 +103,7 @@ fn name(e: &EffectReport) -> String {
     let title = EffectId::from_id(&e.id).map_or(e.id.as_str(), |id| id.description().title);
     let value = e.parameters.first().filter(|p| p.ci95.is_some());
     let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
-    let value = value.map(|p| format!("{} = {}{}", p.name, super::commands::significant(p.value), unit(&p.unit)));
+    let value = value.map(|p| format!("{} = {}{}", p.name, measured(p.value, p.ci95), unit(&p.unit)));
     value.map_or(title.to_owned(), |v| format!("{title} ({v})"))
 }
 
@@ -103,6 +131,16 @@ mod tests {
         assert_eq!(degrees(0.26789), "0.268°");
         assert_eq!(degrees(0.0011), "0.00110°");
         assert_eq!(degrees(f64::NAN), "—");
+    }
+
+    #[test]
+    fn a_value_is_as_sharp_as_it_is_known() {
+        assert_eq!(measured(1.0131963, Some([1.0131924, 1.0132002])), "1.0131963 ± 0.0000039");
+        assert_eq!(measured(27.01908, Some([26.982494, 27.055666])), "27.019 ± 0.037");
+        assert_eq!(measured(180.0, Some([100.0, 260.0])), "180 ± 80");
+        assert_eq!(measured(3.0, None), "3");
+        assert_eq!(interval(27.01908, [26.982494, 27.055666]), ["27.019", "26.982", "27.056"]);
+        assert_eq!(interval(2.5e-6, [2.4e-6, 2.6e-6])[0], "2.50000e-6");
     }
 
     #[test]

@@ -61,9 +61,9 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     let data: Vec<Value> = figures.iter().map(Figure::data).collect();
     let data = serde_json::to_string(&data).map_err(Failure::input)?;
     // no text within a script may end it
-    let _ = write!(
+    let _ = writeln!(
         h,
-        "<script type=\"application/json\" id=\"figures\">{}</script>{}<script>{SCRIPT}</script></body></html>\n",
+        "<script type=\"application/json\" id=\"figures\">{}</script>{}<script>{SCRIPT}</script></body></html>",
         data.replace("</", "<\\/"),
         plotly_script()
     );

@@ -10,12 +10,15 @@
     dark: { "@raw": "#ff8c3a", "@declared": "#56b4e9", "@discovered": "#2fd3a4", "@4": "#e9a3c9", "@5": "#f0c14b",
       "@6": "#9ad5ff", "@7": "#dddddd", "@muted": "#a0a0a0", "@band": "rgba(200,200,200,0.18)", "@zero": "#22272b" },
   };
+  const NARROW_PX = 600;
   const prefersDark = matchMedia("(prefers-color-scheme: dark)");
   let chosen = null;
   const theme = () => chosen || (prefersDark.matches ? "dark" : "light");
   const inked = (value, ink) => {
     if (typeof value === "string") return ink[value] || value;
-    if (Array.isArray(value)) return typeof value[0] === "number" ? value : value.map((v) => inked(v, ink));
+    // data have no colours; a step of a colour scale is a number and one
+    if (Array.isArray(value))
+      return typeof value[0] === "number" && typeof value[1] !== "string" ? value : value.map((v) => inked(v, ink));
     if (value && typeof value === "object")
       return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, inked(v, ink)]));
     return value;
@@ -24,11 +27,18 @@
     const dark = name === "dark";
     const [fg, grid] = dark ? ["#ececec", "#343a40"] : ["#1a1a1a", "#e4e4e4"];
     const layout = inked(figure.layout, inks[name]);
+    const traces = inked(figure.traces, inks[name]);
     for (const key of Object.keys(layout))
       if (/^[xy]axis/.test(key))
         layout[key] = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, automargin: true, ...layout[key] };
+    // a narrow page has no room for the names twice: the columns are in the order of the rows
+    if (figure.id === "correlations" && (width || innerWidth) < NARROW_PX) {
+      layout.xaxis = { ...layout.xaxis, showticklabels: false };
+      layout.margin = { l: 150, r: 8, t: 16, b: 24 };
+      traces[0].showscale = false;
+    }
     return {
-      traces: inked(figure.traces, inks[name]),
+      traces,
       layout: {
         margin: { l: 64, r: 16, t: 16, b: 48 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { color: fg, family: "system-ui, sans-serif", size: 13 }, hovermode: "closest",

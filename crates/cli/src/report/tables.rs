@@ -7,6 +7,7 @@ use cvg_calibration::report::{Estimate, Report};
 
 use super::escape;
 use super::figures::run_name;
+use super::finding::interval;
 use crate::commands::significant;
 use crate::standard;
 
@@ -51,12 +52,12 @@ fn parameters(h: &mut String, identified: &Identification) {
     let r = &identified.report;
     h.push_str("<h2 id=\"parameters\">Parameters</h2>");
     table(h, "Values with 95 % intervals", &["parameter", "value", "95 % interval", "unit"], |h| {
-        let mut estimate = |name: &str, e: Option<&Estimate>| {
-            let interval = |e: &Estimate| format!("{:.7} … {:.7}", e.ci95[0], e.ci95[1]);
-            match e {
-                Some(e) => row(h, &[name, &format!("{:.7}", e.value), &interval(e), "1"]),
-                None => row(h, &[name, "not told by this campaign", "", "1"]),
+        let mut estimate = |name: &str, e: Option<&Estimate>| match e {
+            Some(e) => {
+                let [value, low, high] = interval(e.value, e.ci95);
+                row(h, &[name, &value, &format!("{low} … {high}"), "1"]);
             }
+            None => row(h, &[name, "not told by this campaign", "", "1"]),
         };
         estimate("angular gain k (scale factor)", Some(&r.angular_gain));
         estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref());
@@ -65,9 +66,11 @@ fn parameters(h: &mut String, identified: &Identification) {
         }
         for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));
-            let interval =
-                p.ci95.map_or("set by a search".into(), |c| format!("{} … {}", significant(c[0]), significant(c[1])));
-            row(h, &[&name, &significant(p.value), &interval, &escape(&p.unit)]);
+            let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
+                Some([value, low, high]) => (value, format!("{low} … {high}")),
+                None => (significant(p.value), "set by a search".to_owned()),
+            };
+            row(h, &[&name, &value, &ends, &escape(&p.unit)]);
         }
     });
     let Some(c) = identified.picture.as_ref().map(|p| &p.correlations) else { return };

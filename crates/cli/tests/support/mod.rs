@@ -209,3 +209,23 @@ angle_deg = 90.0
 energy_off_s = 3.0
 duration_s = 8.0
 "#;
+
+/// The same recording as a foreign instrument would write it: names of its own, milliseconds, `;`, decimal commas.
+pub(crate) fn foreign(bench: &Bench, name: &str) -> String {
+    let sheet = Sheet::of(&bench.read(name));
+    let names = ["t_s", "rate_dps", "xc_v", "xs_v", "yc_v", "ys_v", "vas_v", "vqc_v"];
+    let columns: Vec<Vec<f64>> = names.iter().map(|n| sheet.numbers(n)).collect();
+    let mut text = String::from("% LabTool export\n% demodulator 0\nTime (ms);Table;D1 X;D1 Y;D2 X;D2 Y;PID1;PID2\n");
+    for row in 0..columns[0].len() {
+        if row == 100 {
+            text.push_str("% range changed\n");
+        }
+        let cells: Vec<String> = columns
+            .iter()
+            .enumerate()
+            .map(|(c, v)| if c == 0 { 1e3 * v[row] } else { v[row] }.to_string().replace('.', ","))
+            .collect();
+        text.push_str(&(cells.join(";") + "\n"));
+    }
+    text
+}

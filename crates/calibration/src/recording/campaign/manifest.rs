@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Instrument, Role, RunKind};
 use crate::recording::error::ReadError;
+use crate::recording::naming::Naming;
 
 /// A place in the campaign file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +41,8 @@ pub(super) struct Manifest {
     pub(super) carrier_hz: Option<f64>,
     pub(super) angular_gain: Option<f64>,
     pub(super) period_deg: Option<f64>,
+    /// What the recordings call their columns.
+    pub(super) naming: Naming,
     pub(super) runs: Vec<Entry>,
     pub(super) warnings: Vec<String>,
 }
@@ -90,7 +93,7 @@ impl Text<'_> {
     }
 
     fn manifest(&self, document: &DeTable<'_>) -> Result<Manifest, ReadError> {
-        self.refuse_unknown(document, &["campaign", "run"], "at the top of a campaign file")?;
+        self.refuse_unknown(document, &["campaign", "columns", "run"], "at the top of a campaign file")?;
         let Some(campaign) = get(document, "campaign") else {
             return Err(self.refuse(0..0, "there is no `[campaign]`", "a table `[campaign]` with the key `device`"));
         };
@@ -113,8 +116,26 @@ impl Text<'_> {
         let carrier_hz = self.number(head, "carrier_hz", "a positive number of Hz", |value| value > 0.0)?;
         let angular_gain = self.number(head, "angular_gain", "a number other than 0", |value| value != 0.0)?;
         let period_deg = self.number(head, "period_deg", "180 or 360", |value| value == 180.0 || value == 360.0)?;
+        let naming = self.columns(document)?;
         let runs = self.runs(document, instrument)?;
-        Ok(Manifest { device, instrument, carrier_hz, angular_gain, period_deg, runs, warnings })
+        Ok(Manifest { device, instrument, carrier_hz, angular_gain, period_deg, naming, runs, warnings })
+    }
+
+    /// `[columns]`: a channel on the left, what the recordings call it on the right.
+    fn columns(&self, document: &DeTable<'_>) -> Result<Naming, ReadError> {
+        const WANTED: &str = "a channel and the name of its column, as in `theta_deg = \"Ch3\"`";
+        let mut naming = Naming::default();
+        let Some(columns) = get(document, "columns") else { return Ok(naming) };
+        let Some(table) = columns.get_ref().as_table() else {
+            return Err(self.refuse(columns.span(), "`columns` is not a table", WANTED));
+        };
+        for (channel, column) in table {
+            let name = self.string(column, channel.get_ref())?;
+            naming
+                .add(&format!("{}={name}", channel.get_ref()))
+                .map_err(|what| self.refuse(channel.span(), what, WANTED))?;
+        }
+        Ok(naming)
     }
 
     fn runs(&self, document: &DeTable<'_>, instrument: Instrument) -> Result<Vec<Entry>, ReadError> {

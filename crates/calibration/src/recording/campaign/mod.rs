@@ -5,6 +5,7 @@
 
 mod manifest;
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -135,13 +136,21 @@ impl Campaign {
     pub fn of_recordings(recordings: Vec<Recording>) -> Result<Self, ReadError> {
         let sources: Vec<PathBuf> = recordings.iter().map(|r| r.source.clone()).collect();
         let name = match sources.as_slice() {
-            [one] => one.file_stem(),
-            [first, ..] => first.parent().and_then(Path::file_name),
+            [one] => one.file_stem().map(OsStr::to_owned),
+            [first, ..] => std::path::absolute(first).ok().and_then(|p| Some(p.parent()?.file_name()?.to_owned())),
             [] => None,
         };
         let device = name.map_or_else(|| "recordings".to_owned(), |name| name.to_string_lossy().into_owned());
         let runs = recordings.into_iter().map(Self::rotation).collect::<Result<_, _>>()?;
         Ok(Self { source: sources.into_iter().next().unwrap_or_default(), device, runs, ..Self::default() })
+    }
+
+    /// What a campaign file says its recordings call their columns.
+    ///
+    /// # Errors
+    /// [`ReadError`]: the campaign file cannot be read, or says something it cannot mean.
+    pub fn columns(path: &Path) -> Result<Naming, ReadError> {
+        Ok(Self::manifest(path)?.naming)
     }
 
     fn rotation(recording: Recording) -> Result<Run, ReadError> {
@@ -157,12 +166,17 @@ impl Campaign {
         })
     }
 
-    fn open_manifest(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
+    fn manifest(path: &Path) -> Result<Manifest, ReadError> {
         let io = |error| ReadError::io(path, error);
         if std::fs::metadata(path).map_err(io)?.is_dir() {
             return Err(ReadError::Directory { path: path.to_path_buf() });
         }
-        let manifest = manifest::parse(&std::fs::read(path).map_err(io)?, path)?;
+        manifest::parse(&std::fs::read(path).map_err(io)?, path)
+    }
+
+    fn open_manifest(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
+        let manifest = Self::manifest(path)?;
+        let naming = &naming.over(&manifest.naming);
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut runs: Vec<Run> = vec![];
         let mut warnings = manifest.warnings.clone();

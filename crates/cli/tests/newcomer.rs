@@ -1,0 +1,97 @@
+//! The way of someone who has the README, and recordings from an instrument that knows nothing of this program: names
+//! of its own, milliseconds, `;`, decimal commas, remarks. Every stumble has an answer that says the next step.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{Bench, cvg, cvg_ok, foreign, report};
+
+/// The table that the README shows.
+const COLUMNS: &str = "[columns]\nt_s = \"Time (ms)*0.001\"\nrate_dps = \"Table\"\nxc_v = \"D1 X\"\nxs_v = \"D1 Y\"\n\
+                       yc_v = \"D2 X\"\nys_v = \"D2 Y\"\nvas_v = \"PID1\"\nvqc_v = \"PID2\"\n";
+
+/// A campaign whose recordings have foreign names and columns; `columns` stands in its campaign file.
+fn foreign_bench(columns: &str) -> Bench {
+    let bench = Bench::small();
+    let mut campaign = bench.read("campaign.toml");
+    let mut names = bench.recordings("");
+    // the longest first, since one name may begin another
+    names.sort_by_key(|name| std::cmp::Reverse(name.len()));
+    for (number, name) in names.iter().enumerate() {
+        let export = format!("export {number}.csv");
+        bench.write(&export, foreign(&bench, name));
+        fs::remove_file(bench.path(name)).unwrap();
+        campaign = campaign.replace(&format!("\"{name}\""), &format!("\"{export}\""));
+    }
+    let at = campaign.find("[[run]]").unwrap();
+    campaign.insert_str(at, columns);
+    bench.write("campaign.toml", campaign);
+    bench
+}
+
+fn run(arguments: &[&dyn AsRef<OsStr>]) -> String {
+    let arguments: Vec<&OsStr> = arguments.iter().map(|a| (*a).as_ref()).collect();
+    cvg_ok(&arguments)
+}
+
+#[test]
+fn a_first_look_says_what_the_columns_are_and_how_to_name_them() {
+    let bench = foreign_bench("");
+    let file = bench.path("export 0.csv");
+    for command in ["inspect", "identify"] {
+        let refused = cvg(&[OsStr::new(command), file.as_os_str()]);
+        assert_eq!(refused.status, 2);
+        for part in ["`D1 X`", "--map 't_s=Time (ms)'", "[columns] of a campaign.toml"] {
+            assert!(refused.stderr.contains(part), "{command}: {part}: {}", refused.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_campaign_of_foreign_files_is_identified_and_compensated_as_one_of_ours() {
+    let (own, bench) = (Bench::small(), foreign_bench(COLUMNS));
+    let (campaign, results) = (bench.campaign(), bench.path("results"));
+    assert!(run(&[&"inspect", &campaign]).contains("serves as a rotation"));
+    run(&[&"identify", &campaign, &"--out", &results]);
+    let found: Value = serde_json::from_slice(&fs::read(results.join("report.json")).unwrap()).unwrap();
+    let wanted = report(&own.campaign());
+    for key in ["detection_gain_ratio", "angular_gain"] {
+        let [a, b] = [&found, &wanted].map(|r| r[key]["value"].as_f64().unwrap());
+        assert!((a - b).abs() < 1e-9, "{key}: {a} {b}");
+    }
+    let (calibration, export, clean) = (results.join("calibration.toml"), bench.path("export 0.csv"), "clean.csv");
+    let clean = bench.path(clean);
+    run(&[&"compensate", &calibration, &export, &"--map", &campaign, &"--out", &clean]);
+    assert!(fs::read_to_string(clean).unwrap().starts_with("t_s,rate_dps,xc_v"));
+}
+
+#[test]
+fn what_is_said_on_the_line_stands_over_the_campaign_file() {
+    let bench = foreign_bench(COLUMNS);
+    let campaign = bench.campaign();
+    let refused = cvg(&[OsStr::new("identify"), campaign.as_os_str(), "--map".as_ref(), "xc_v=D9".as_ref()]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("`D9`"), "{}", refused.stderr);
+}
+
+#[test]
+fn a_ring_down_among_loose_recordings_is_told_where_it_belongs() {
+    let bench = Bench::paper();
+    let (rotation, ringdown) = (bench.path(&bench.recordings("rot")[0]), bench.path(&bench.recordings("ring")[0]));
+    let refused = cvg(&[OsStr::new("identify"), rotation.as_os_str(), ringdown.as_os_str()]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("ring-down") && refused.stderr.contains("campaign.toml"), "{}", refused.stderr);
+}
+
+#[test]
+fn the_readme_shows_the_table_that_this_test_uses() {
+    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md")).unwrap();
+    for line in COLUMNS.lines() {
+        assert!(readme.lines().any(|l| l.split('#').next().unwrap().trim() == line), "README.md lacks {line}");
+    }
+}

@@ -1,0 +1,230 @@
+//! The command line as people expect it: foreign files, patterns, standard input, several recordings, inspection, the
+//! library, completion, manual pages.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use cvg_model::effects::EffectId;
+use serde_json::Value;
+use support::{Bench, cvg, cvg_ok, foreign};
+use tempfile::TempDir;
+
+const MAPPING: [&str; 16] = [
+    "--map",
+    "t_s=Time (ms)*0.001",
+    "--map",
+    "rate_dps=Table",
+    "--map",
+    "xc_v=D1 X",
+    "--map",
+    "xs_v=D1 Y",
+    "--map",
+    "yc_v=D2 X",
+    "--map",
+    "ys_v=D2 Y",
+    "--map",
+    "vas_v=PID1",
+    "--map",
+    "vqc_v=PID2",
+];
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+fn ratio(report: &Value) -> f64 {
+    report["detection_gain_ratio"]["value"].as_f64().unwrap()
+}
+
+#[test]
+fn a_foreign_export_gives_the_same_answer_as_the_file_in_our_names() {
+    let bench = Bench::small();
+    let name = &bench.recordings("rot")[0];
+    bench.write("export.csv", foreign(&bench, name));
+    let (own, export) = (bench.path(name), bench.path("export.csv"));
+    let wanted = json(&cvg_ok(&[OsStr::new("identify"), own.as_os_str(), OsStr::new("--json")]));
+    let mut arguments = vec![OsStr::new("identify"), export.as_os_str(), OsStr::new("--json")];
+    arguments.extend(MAPPING.map(OsStr::new));
+    let found = json(&cvg_ok(&arguments));
+    assert!((ratio(&found) - ratio(&wanted)).abs() < 1e-9, "{} {}", ratio(&found), ratio(&wanted));
+    // without the mapping it says what is there and how to name it
+    let refused = cvg(&[OsStr::new("identify"), export.as_os_str()]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("`D1 X`") && refused.stderr.contains("--map"), "{}", refused.stderr);
+}
+
+#[test]
+fn standard_input_is_a_recording() {
+    let bench = Bench::small();
+    let name = &bench.recordings("rot")[0];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_cvg"))
+        .args(["identify", "-", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(bench.read(name).as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let (piped, path) = (json(std::str::from_utf8(&output.stdout).unwrap()), bench.path(name));
+    assert_eq!(ratio(&piped), ratio(&json(&cvg_ok(&[OsStr::new("identify"), path.as_os_str(), OsStr::new("--json")]))));
+}
+
+#[test]
+fn a_pattern_stands_for_its_recordings_and_one_can_be_held_out() {
+    let bench = Bench::small();
+    let pattern = bench.path("rot*.csv");
+    let all =
+        json(&cvg_ok(&[OsStr::new("identify"), pattern.as_os_str(), OsStr::new("--settle=1"), OsStr::new("--json")]));
+    let names = bench.recordings("rot");
+    assert_eq!(all["runs"].as_array().unwrap().len(), names.len());
+    let check = bench.path("check.csv");
+    let held = json(&cvg_ok(&[
+        OsStr::new("identify"),
+        pattern.as_os_str(),
+        OsStr::new("--holdout"),
+        check.as_os_str(),
+        OsStr::new("--json"),
+    ]));
+    let uses: Vec<&str> = held["runs"].as_array().unwrap().iter().map(|r| r["use"].as_str().unwrap()).collect();
+    assert_eq!(uses.iter().filter(|u| **u == "holdout").count(), 1, "{uses:?}");
+    for (arguments, part) in [
+        (vec![bench.path("none*.csv")], "no file has a name like this"),
+        (vec![check.clone(), check.clone()], "named twice"),
+        (vec![bench.campaign(), check], "stands alone"),
+    ] {
+        let mut all = vec![OsStr::new("identify")];
+        all.extend(arguments.iter().map(|a| a.as_os_str()));
+        let refused = cvg(&all);
+        assert_eq!(refused.status, 2);
+        assert!(refused.stderr.contains(part), "{}", refused.stderr);
+    }
+}
+
+#[test]
+fn a_mapping_that_cannot_be_meant_is_refused() {
+    let refused = cvg(&["identify", "rot.csv", "--map", "angle=Ch3"]);
+    assert_eq!((refused.status, refused.stdout.as_str()), (2, ""));
+    assert!(
+        refused.stderr.contains("`angle` is no channel") && refused.stderr.contains("`theta_deg`"),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn inspect_says_what_is_in_a_file_and_what_is_wrong_with_it() {
+    let bench = Bench::small();
+    let name = &bench.recordings("rot")[0];
+    bench.write("dirty.csv", bench.read(name) + "1e9,NaN,,,,,,\n");
+    let (file, plot) = (bench.path("dirty.csv"), bench.path("dirty.svg"));
+    let said = cvg_ok(&[OsStr::new("inspect"), file.as_os_str(), OsStr::new("--plot"), plot.as_os_str()]);
+    for part in ["rows over", "xc_v", "serves as a rotation", "1 rows dropped", "warning: "] {
+        assert!(said.contains(part), "{part:?} is not in {said}");
+    }
+    assert!(fs::read_to_string(plot).unwrap().contains("<svg"));
+    let facts = json(&cvg_ok(&[OsStr::new("inspect"), file.as_os_str(), OsStr::new("--json")]));
+    assert_eq!((facts[0]["rotation"].as_bool(), facts[0]["rows_dropped"].as_u64()), (Some(true), Some(1)));
+    let campaign = bench.campaign();
+    assert!(cvg_ok(&[OsStr::new("inspect"), campaign.as_os_str()]).contains("runs"));
+}
+
+#[test]
+fn the_library_is_listed_as_its_descriptions_tell_it() {
+    let list = cvg_ok(&["effects"]);
+    let library = json(&cvg_ok(&["effects", "--json"]));
+    assert_eq!(list.lines().count(), EffectId::ALL.len());
+    for (effect, facts) in EffectId::ALL.iter().zip(library.as_array().unwrap()) {
+        let d = effect.description();
+        assert!(list.contains(d.id) && list.contains(d.title));
+        assert_eq!((facts["id"].as_str(), facts["signature"].as_str()), (Some(d.id), Some(d.signature)));
+        let full = cvg_ok(&["effects", d.id]);
+        assert!(d.parameters.iter().all(|p| full.contains(p.name)), "{full}");
+    }
+    let refused = cvg(&["effects", "gremlins"]);
+    assert_eq!(refused.status, 2);
+    assert!(refused.stderr.contains("gremlins") && refused.stderr.contains("detection-cubic"), "{}", refused.stderr);
+}
+
+#[test]
+fn shells_complete_every_command() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = cvg_ok(&["completions", shell]);
+        for command in ["identify", "inspect", "compensate", "effects", "paper"] {
+            assert!(script.contains(command), "{shell}: {command}");
+        }
+    }
+}
+
+#[test]
+fn every_command_has_a_manual_page_and_help_with_examples() {
+    let folder = TempDir::new().unwrap();
+    cvg_ok(&[OsStr::new("man"), OsStr::new("--out"), folder.path().as_os_str()]);
+    for command in ["identify", "inspect", "compensate", "completions"] {
+        let page = fs::read_to_string(folder.path().join(format!("cvg-{command}.1"))).unwrap();
+        assert!(page.contains(".TH") && page.contains("Examples"), "{command}");
+        assert!(cvg_ok(&[command, "--help"]).contains("Examples:\n  cvg"), "{command}");
+    }
+    assert!(fs::read_to_string(folder.path().join("cvg.1")).unwrap().contains("identify"));
+}
+
+#[test]
+fn no_colour_and_no_progress_reach_what_is_not_a_terminal() {
+    let bench = Bench::small();
+    let campaign = bench.campaign();
+    for arguments in
+        [vec![OsStr::new("identify"), campaign.as_os_str()], vec![OsStr::new("identify"), OsStr::new("no.csv")]]
+    {
+        let outcome = cvg(&arguments);
+        let said = outcome.stdout + &outcome.stderr;
+        assert!(!said.contains('\u{1b}') && !said.contains('\r'), "{said:?}");
+    }
+}
+
+/// What `cvg identify -` shows on a terminal of its own when its input comes after `delay` seconds.
+#[cfg(target_os = "linux")]
+fn on_a_terminal(bench: &Bench, delay: &str, environment: &str) -> String {
+    let recording = bench.path(&bench.recordings("rot")[0]);
+    let line = format!(
+        "(sleep {delay}; cat '{}') | {environment} '{}' identify - > /dev/null",
+        recording.display(),
+        env!("CARGO_BIN_EXE_cvg")
+    );
+    let output = Command::new("script").args(["-qec", &line, "/dev/null"]).stdin(Stdio::null()).output().unwrap();
+    assert!(output.status.success());
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn progress_is_shown_on_a_terminal_to_who_has_to_wait() {
+    let bench = Bench::small();
+    let waited = on_a_terminal(&bench, "1.5", "");
+    assert!(waited.contains("reading"), "{waited:?}");
+    let quick = on_a_terminal(&bench, "0", "");
+    assert!(!quick.contains("reading"), "{quick:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn errors_are_coloured_on_a_terminal_unless_no_colour_is_wanted() {
+    let said = |environment: &str| {
+        let line = format!("{environment} '{}' identify no-such-file.csv; true", env!("CARGO_BIN_EXE_cvg"));
+        let output = Command::new("script")
+            .args(["-qec", &line, "/dev/null"])
+            .env_remove("NO_COLOR")
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(said("").contains("\u{1b}[1;31merror:"), "{:?}", said(""));
+    let plain = said("NO_COLOR=1");
+    assert!(plain.contains("error:") && !plain.contains('\u{1b}'), "{plain:?}");
+}

@@ -1,0 +1,115 @@
+//! "Add an effect" of the book, followed to the letter: its blocks are put into a copy of the repository, and the tests that
+//! it names are run there.
+
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+const PAGE: &str = "docs/src/adding-an-effect.md";
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(1).map(Path::to_owned).unwrap_or_default()
+}
+
+/// What a block of the page is for.
+#[derive(Debug, PartialEq)]
+enum Block {
+    /// a new file
+    File(PathBuf, String),
+    /// lines for a file that is there: what follows a line that must be found once, or stands in its place
+    Insert(PathBuf, String),
+}
+
+/// The blocks that follow a remark `<!-- file: … -->` or `<!-- insert: … -->`.
+fn blocks(page: &str) -> Vec<Block> {
+    let mut found = Vec::new();
+    for part in page.split("<!-- ").skip(1) {
+        let Some((remark, rest)) = part.split_once(" -->\n```") else { continue };
+        let body = rest.split_once('\n').and_then(|(_, rest)| rest.split_once("\n```"));
+        let (Some((kind, path)), Some((body, _))) = (remark.split_once(": "), body) else { continue };
+        match kind {
+            "file" => found.push(Block::File(path.into(), format!("{body}\n"))),
+            "insert" => found.push(Block::Insert(path.into(), body.to_owned())),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// `text` with a difference applied: its ` ` and `-` lines have to be found, once and together.
+fn patched(text: &str, difference: &str) -> Result<String> {
+    let side = |other: char| -> String {
+        difference
+            .lines()
+            .filter(|l| !l.starts_with(other))
+            .map(|l| format!("{}\n", l.get(1..).unwrap_or("")))
+            .collect()
+    };
+    let (before, after) = (side('+'), side('-'));
+    match text.matches(&before).count() {
+        1 => Ok(text.replace(&before, &after)),
+        n => Err(format!("found {n} times: {before}").into()),
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            if !["target", "node_modules"].iter().any(|name| entry.file_name() == *name) {
+                copy(&entry.path(), &target)?;
+            }
+        } else {
+            fs::copy(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
+    let (root, folder) = (repository(), tempfile::tempdir()?);
+    for name in ["crates", "examples", "tests"] {
+        copy(&root.join(name), &folder.path().join(name))?;
+    }
+    for name in ["Cargo.toml", "Cargo.lock"] {
+        fs::copy(root.join(name), folder.path().join(name))?;
+    }
+    let blocks = blocks(&fs::read_to_string(root.join(PAGE))?);
+    assert_eq!(blocks.len(), 6, "{PAGE} has lost a block: {blocks:?}");
+    for block in blocks {
+        match block {
+            Block::File(path, text) => fs::write(folder.path().join(path), text)?,
+            Block::Insert(path, difference) => {
+                let path = folder.path().join(path);
+                fs::write(&path, patched(&fs::read_to_string(&path)?, &difference)?)?;
+            }
+        }
+    }
+    // what is built for this test serves the copy too; its own crates lie elsewhere and so have names of their own
+    let target = std::env::current_exe()?.ancestors().nth(3).map(Path::to_owned).ok_or("no folder of builds")?;
+    let output = Command::new(env!("CARGO"))
+        .args(["test", "--workspace", "--locked", "--test", "effects", "--test", "cross_cubic"])
+        .current_dir(folder.path())
+        .env("CARGO_TARGET_DIR", target)
+        .env("INSTA_UPDATE", "always")
+        .output()?;
+    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}");
+    for test in ["a_cubic_of_x_in_y_is_discovered ... ok", "prop_a_cubic_of_x_in_y_shows_at_2theta_and_4theta ... ok"] {
+        assert!(said.contains(test), "{test} is not in {said}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_block_that_does_not_fit_is_noticed() {
+    assert!(patched("a\nb\n", " c\n+d").is_err(), "its place is not there");
+    assert!(patched("a\na\n", " a\n+d").is_err(), "its place is there twice");
+    assert_eq!(patched("a\nb\nc\n", " a\n-b\n+d").ok().as_deref(), Some("a\nd\nc\n"));
+}
