@@ -18,8 +18,8 @@ use crate::recording::{Instrument, Role};
 pub(crate) struct EnergyBalance {
     /// of what is left of ln a
     pub(crate) mean_square: f64,
-    /// the force scale that closes it, and its standard deviation if what is left is white with `noise`
-    pub(crate) force_scale: f64,
+    /// the hypothesis with the force scale, the damping and the anisodamping that close it
+    pub(crate) closed: Hypothesis,
     information: f64,
 }
 
@@ -75,9 +75,13 @@ pub(crate) fn energy_balance(
     normal.fill_upper_triangle_with_lower_triangle();
     let inverse = scaled_inverse(&normal, 0.0)?;
     let step = &inverse * &right;
+    let mut closed = hypothesis.clone();
+    for (unknown, step) in unknowns.all.iter().zip(&step) {
+        closed.set(*unknown, closed.get(*unknown) + step);
+    }
     Some(EnergyBalance {
         mean_square: (squares - step.dot(&right)).max(0.0) / count.max(1) as f64,
-        force_scale: hypothesis.force_scale + step[0],
+        closed,
         information: 1.0 / inverse[(0, 0)].max(f64::MIN_POSITIVE),
     })
 }

@@ -11,14 +11,14 @@ use rayon::prelude::*;
 use crate::balance::energy_balance;
 use crate::consistency::doubt;
 use crate::error::Refusal;
-use crate::evaluate::{Evaluation, evaluate};
+use crate::evaluate::{ErrorSize, Evaluation, evaluate};
 use crate::fit::{Effort, Fit, Window, fit};
 use crate::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::identify::{Bench, Fitted, fit_with_ring_downs};
 use crate::recording::{Instrument, Role};
 use crate::residual::{
-    Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
-    strongest_line,
+    Along, Follows, Harmonic, WHITENESS_LAGS, autocorrelation, drift_power, inflation, pattern_harmonics,
+    resolved_harmonics, strongest_harmonics, strongest_line,
 };
 use crate::start::Ellipse;
 
@@ -85,6 +85,10 @@ pub struct Step {
     pub rivals: Vec<(EffectId, f64)>,
     /// held-out rms before and after, deg
     pub heldout_rms_deg: [f64; 2],
+    /// size of the held-out error after it
+    pub heldout: ErrorSize,
+    /// harmonics of the pattern in it
+    pub harmonics: Vec<Harmonic>,
     /// effects of the library that explain the residual as well
     pub confounded_with: Vec<EffectId>,
     /// rms of what the energy balance leaves of ln a, before and after; where amplitude and commands were recorded
@@ -180,6 +184,8 @@ fn centre(bench: &mut Bench, plain: &Fitted, ellipse: &Ellipse) -> Result<(Fitte
                 rivals: Vec::new(),
                 heldout_rms_deg: [heldout(bench, &without), heldout(bench, &with)]
                     .map(|square| square.sqrt().to_degrees()),
+                heldout: on_heldout(bench, &with).size(),
+                harmonics: pattern_harmonics(&on_heldout(bench, &with)),
                 confounded_with: Vec::new(),
                 energy_balance: None,
                 doubt: None,
@@ -246,7 +252,8 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
         let Some((chosen, origin, confounded_with)) = choose(&trials, told) else { return Ok(None) };
         let chosen = chosen.clone();
         let next = fit_with_ring_downs(bench, &extend_from(&chosen, origin))?;
-        let heldout_after = heldout(bench, &next.fit);
+        let after = on_heldout(bench, &next.fit);
+        let heldout_after = after.mean_square();
         trials.retain(|t| t.candidate != chosen.candidate);
         if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before || heldout_before - heldout_after < least_removed
         {
@@ -259,6 +266,8 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
             gain: chosen.gain,
             rivals: trials.iter().map(|t| (t.candidate.id, t.gain)).take(3).collect(),
             heldout_rms_deg: [heldout_before, heldout_after].map(|square| square.sqrt().to_degrees()),
+            heldout: after.size(),
+            harmonics: pattern_harmonics(&after),
             confounded_with,
             energy_balance: balance_before.zip(chosen.balance).map(|(a, b)| [a.sqrt(), b.sqrt()]),
             doubt: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
@@ -597,7 +606,12 @@ fn floor(bench: &Bench, fit: &Fit) -> f64 {
     evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
 }
 
+/// A fit on the held-out data.
+fn on_heldout(bench: &Bench, fit: &Fit) -> Evaluation {
+    evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None)
+}
+
 /// Held-out mean square of a fit, rad².
 fn heldout(bench: &Bench, fit: &Fit) -> f64 {
-    evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None).mean_square()
+    on_heldout(bench, fit).mean_square()
 }

@@ -43,30 +43,31 @@ pub(crate) fn evaluate(
 ) -> Evaluation {
     let mut segments: Vec<Residual> =
         residuals(tracks, hypothesis, starts, role, window).into_iter().flatten().collect();
-    let mut kept = Vec::with_capacity(segments.len());
-    for (number, s) in segments.iter_mut().enumerate() {
+    for s in &mut segments {
         let middle = circular_mean(s.angle.iter().copied(), hypothesis.period_rad);
         for a in &mut s.angle {
             *a = wrapped(*a - middle, hypothesis.period_rad);
         }
-        if let Some(like) = like {
-            let keep = like.kept[number].clone();
-            take_line(s, &keep);
-            kept.push(keep);
-            continue;
-        }
-        let mut keep = vec![true; s.angle.len()];
-        for _ in 0..3 {
-            take_line(s, &keep);
-            let limit = SPIKE * robust_deviation(s.angle.iter().copied()) + f64::MIN_POSITIVE;
-            for (k, a) in keep.iter_mut().zip(&s.angle) {
-                *k = a.abs() <= limit;
-            }
-        }
-        take_line(s, &keep);
-        kept.push(keep);
     }
-    Evaluation { segments, kept }
+    let Some(like) = like else { return Evaluation::of(segments) };
+    for (s, keep) in segments.iter_mut().zip(&like.kept) {
+        take_line(s, keep);
+    }
+    Evaluation { segments, kept: like.kept.clone() }
+}
+
+/// Takes the best line out of a segment, and its spikes out of the line; says what is left of it.
+fn straightened(s: &mut Residual) -> Vec<bool> {
+    let mut keep = vec![true; s.angle.len()];
+    for _ in 0..3 {
+        take_line(s, &keep);
+        let limit = SPIKE * robust_deviation(s.angle.iter().copied()) + f64::MIN_POSITIVE;
+        for (k, a) in keep.iter_mut().zip(&s.angle) {
+            *k = a.abs() <= limit;
+        }
+    }
+    take_line(s, &keep);
+    keep
 }
 
 /// Takes the best line through the kept samples out of all of them.
@@ -84,6 +85,12 @@ fn take_line(s: &mut Residual, keep: &[bool]) {
 }
 
 impl Evaluation {
+    /// Residuals less the best line and the spikes of each segment.
+    pub(crate) fn of(mut segments: Vec<Residual>) -> Self {
+        let kept = segments.iter_mut().map(straightened).collect();
+        Self { segments, kept }
+    }
+
     /// Kept angle errors, rad, all segments.
     pub(crate) fn errors(&self) -> impl Iterator<Item = f64> + '_ {
         self.segments

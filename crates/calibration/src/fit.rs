@@ -431,11 +431,11 @@ pub(crate) struct Residual {
 }
 
 impl Residual {
-    fn new(track: usize, segment: &Segment) -> Self {
+    pub(crate) fn new(track: usize, segment: &Segment) -> Self {
         Self { track, samples: segment.range.len(), ..Self::default() }
     }
 
-    fn push(&mut self, track: &Track, row: &crate::pass::Row<'_>) {
+    pub(crate) fn push(&mut self, track: &Track, row: &crate::pass::Row<'_>) {
         self.t_s.push(track.t_s[row.index]);
         self.turned.push(row.turned);
         self.table.push(track.input_rad[row.index]);

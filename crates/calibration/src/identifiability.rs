@@ -43,18 +43,37 @@ pub(crate) fn confounded_with(
     out
 }
 
-/// The run that would separate two effects, from how their shares in the angle scale.
-pub fn separated_by(one: EffectId, other: EffectId) -> &'static str {
+/// What the fitted runs have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Alike {
+    /// they turn one way
+    pub(crate) direction: bool,
+    /// at one speed
+    pub(crate) speed: bool,
+    /// at one amplitude
+    pub(crate) amplitude: bool,
+    /// there are no ring-downs
+    pub(crate) no_ring_downs: bool,
+}
+
+/// The run that would separate two effects: what the campaign lacks of that in which their shares scale apart.
+pub(crate) fn separated_by(one: EffectId, other: EffectId, alike: Alike) -> &'static str {
     let (a, b) = (one.description(), other.description());
-    if a.stage == Stage::Actuation || b.stage == Stage::Actuation {
+    let (actuation, input) = ([a, b].map(|d| d.stage == Stage::Actuation), [a, b].map(|d| d.stage == Stage::Input));
+    let by_rate = a.scaling.rate != b.scaling.rate || a.scaling.odd_in_rate != b.scaling.odd_in_rate;
+    if actuation.contains(&true) && alike.no_ring_downs {
         "ring-downs at 0° and 90°"
-    } else if a.scaling.rate != b.scaling.rate || a.scaling.odd_in_rate != b.scaling.odd_in_rate {
-        "a rotation run at another rate, or in the opposite direction"
-    } else if a.scaling.amplitude != b.scaling.amplitude {
+    } else if (by_rate || actuation.contains(&true)) && alike.direction && alike.speed {
+        "rotation runs at another rate and in the opposite direction"
+    } else if (by_rate || actuation.contains(&true)) && alike.speed {
+        "a rotation run at another rate"
+    } else if by_rate && alike.direction {
+        "a rotation run in the opposite direction"
+    } else if a.scaling.amplitude != b.scaling.amplitude && alike.amplitude {
         "a rotation run at another amplitude"
-    } else if a.stage == Stage::Input || b.stage == Stage::Input {
+    } else if input.contains(&true) {
         "a rotation run with the table angle recorded (table_deg), or at another rate"
     } else {
-        "a longer rotation run at another rate and amplitude"
+        "longer rotation runs"
     }
 }

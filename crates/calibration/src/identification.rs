@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 
 use crate::actuation::RingDown;
 use crate::calibration::Calibration;
+use crate::channels::channels;
 use crate::discovery::{Step, discover};
 use crate::error::Refusal;
 use crate::evaluate::{Evaluation, evaluate};
@@ -17,7 +18,8 @@ use crate::recording::{Campaign, Instrument, Role};
 use crate::report::{
     BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA,
 };
-use crate::residual::{Follows, WHITENESS_LAGS, autocorrelation, harmonics, inflation, ljung_box, resolved_harmonics};
+use crate::residual::{Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics};
+use crate::stages::stages;
 use crate::unexplained::{described, unexplained};
 
 /// How an identification is run.
@@ -75,15 +77,11 @@ pub struct BiasCurve {
 
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
-/// Harmonics of the residual that are reported.
-const REPORTED_HARMONICS: u32 = 8;
 /// Share of its prior's width to which an unknown must narrow to count as told by the data.
 const TOLD: f64 = 0.1;
 /// Gain ratios known no better than this, as the half width of the interval, are no answer.
 const WIDEST_DETECTION_RATIO: f64 = 0.1;
 const WIDEST_ACTUATION_RATIO: f64 = 0.02;
-/// Significance of the whiteness test.
-const WHITENESS_LEVEL: f64 = 0.01;
 
 /// Identifies the instrument of a campaign.
 ///
@@ -129,6 +127,10 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
     let covariance = covariance(&bench, &fitted.fit);
 
+    let declared_on_fit =
+        evaluate(&bench.tracks, &declared_fit.hypothesis, &declared_fit.starts, Role::Fit, Window::Whole, None);
+    let mut left = channels(&bench, &declared_fit, "declared", &declared_on_fit);
+    left.extend(channels(&bench, &fitted.fit, "discovered", &on_fit));
     let mut warnings = std::mem::take(&mut bench.warnings);
     let knowledge = Knowledge { bench: &bench, fitted: &fitted, covariance: &covariance };
     let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
@@ -191,7 +193,15 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
             discovered: after.size(),
             noise_floor_deg: noise_floor.to_degrees(),
         },
-        residual: ResidualReport { harmonics: reported_harmonics(&after), white },
+        steps: stages(raw.as_ref(), &before, &after, &steps),
+        residual: ResidualReport {
+            harmonics: [Follows::Pattern, Follows::Table]
+                .into_iter()
+                .flat_map(|of| reported_harmonics(&after, of, &after))
+                .collect(),
+            white,
+        },
+        channels: left,
         unexplained,
         runs,
         warnings,
@@ -261,14 +271,6 @@ fn dropped(d: &crate::recording::Dropped) -> Vec<String> {
         format!("{} × {reason}{first}", tally.count)
     })
     .collect()
-}
-
-fn reported_harmonics(after: &Evaluation) -> Vec<crate::residual::Harmonic> {
-    let inflated = inflation(&autocorrelation(after, WHITENESS_LAGS), after.errors().count());
-    [Follows::Pattern, Follows::Table]
-        .into_iter()
-        .flat_map(|of| harmonics(after, of, resolved_harmonics(after, of, REPORTED_HARMONICS), inflated))
-        .collect()
 }
 
 fn figures(
@@ -389,6 +391,7 @@ impl Knowledge<'_> {
     fn effects(&self, steps: &[Step], after: &Evaluation) -> Vec<EffectReport> {
         let with = after.size().rms_deg;
         let mut steps: Vec<&Step> = steps.iter().collect();
+        let alike = self.bench.alike();
         self.hypothesis()
             .members
             .iter()
@@ -425,7 +428,7 @@ impl Knowledge<'_> {
                     parameters: self.parameters(at, m),
                     heldout_rms_deg: before.is_finite().then_some(BeforeAfter { before, after: after_deg }),
                     evidence: evidence(m, step),
-                    separated_by: rivals.first().map(|r| separated_by(m.id, *r).to_string()),
+                    separated_by: rivals.first().map(|r| separated_by(m.id, *r, alike).to_string()),
                     confounded_with: rivals.iter().map(ToString::to_string).collect(),
                 }
             })

@@ -8,6 +8,7 @@ use crate::balance::energy_balance;
 use crate::error::Refusal;
 use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
 use crate::hypothesis::{Hypothesis, Origin, Unknown, Unknowns};
+use crate::identifiability::Alike;
 use crate::pass::{Pace, walk};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 use crate::start::{Ellipse, motion};
@@ -32,6 +33,8 @@ pub mod belief {
 const SPIKE: f64 = 6.0;
 /// Rates that differ by less than this share count as one.
 pub(crate) const SAME_RATE: f64 = 0.05;
+/// Amplitudes that differ by less than this share count as one.
+const SAME_AMPLITUDE: f64 = 0.05;
 /// A rate that changes by more than this share within a run varies.
 const VARYING_RATE: f64 = 0.2;
 /// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
@@ -236,6 +239,24 @@ impl Bench {
         !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
     }
 
+    /// What the fitted runs have in common.
+    pub(crate) fn alike(&self) -> Alike {
+        let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
+        let ends = fitted
+            .map(|p| {
+                let count = p.track.t_s.len();
+                let sampled = (0..count).step_by((count / STRETCHES).max(1));
+                median(&mut sampled.map(|i| p.track.envelope(i).pendulum().e.sqrt()).collect::<Vec<_>>())
+            })
+            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), a| (low.min(a), high.max(a)));
+        Alike {
+            direction: !self.both_directions(),
+            speed: !self.speeds_differ(),
+            amplitude: ends.1 < (1.0 + SAME_AMPLITUDE) * ends.0,
+            no_ring_downs: self.ring_down_runs.is_empty(),
+        }
+    }
+
     /// The runs were left by another fit than this.
     pub(crate) fn disturbed(&self, fit: &Fit) -> bool {
         self.tracks.iter().zip(&fit.starts).any(|(p, s)| p.starts != *s)
@@ -299,7 +320,7 @@ impl Bench {
         self.energy_balance = None;
         let starts: Vec<_> = self.tracks.iter().map(|p| p.starts.clone()).collect();
         let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };
-        let (scale, deviation) = (balance.force_scale, balance.deviation(BALANCE_NOISE));
+        let (scale, deviation) = (balance.closed.force_scale, balance.deviation(BALANCE_NOISE));
         if scale > 2.0 * deviation {
             self.energy_balance = Some((scale, deviation.max(BALANCE_SHARE * scale)));
             hypothesis.force_scale = scale;

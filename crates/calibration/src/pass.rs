@@ -30,6 +30,10 @@ pub(crate) struct Row<'a> {
     pub(crate) excess: f64,
     /// angle observed minus predicted, rad, within ± half a period
     pub(crate) angle: f64,
+    /// ln of the amplitude
+    pub(crate) ln_amplitude: f64,
+    /// ȧ/a by the mechanics and the commands, 1/s
+    pub(crate) growth: f64,
     /// ln of the amplitude, observed minus predicted
     pub(crate) amplitude: f64,
     /// change of the predicted angle (less the observed) per unknown
@@ -150,6 +154,8 @@ pub(crate) fn walk(
             drift: integrals.sum[0],
             excess: excess.value,
             angle: wrapped(vibration.theta - predicted, hypothesis.period_rad),
+            ln_amplitude: vibration.ln_amplitude,
+            growth: vibration.growth,
             amplitude: vibration.ln_amplitude - ln_a,
             angle_slopes: &angle_slopes,
             amplitude_slopes: &amplitude_slopes,

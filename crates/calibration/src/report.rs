@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::evaluate::ErrorSize;
 use crate::hypothesis::Origin;
-use crate::residual::Harmonic;
+use crate::residual::{Follows, Harmonic};
 
 /// Identifier of the report's format.
 pub const SCHEMA: &str = "cvg.report/1";
@@ -93,6 +93,109 @@ pub struct ResidualReport {
     pub white: bool,
 }
 
+/// What is left in one channel of the fitted runs, at one stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelReport {
+    /// declared, or discovered
+    pub stage: String,
+    /// angle, amplitude, vas, vqc or quadrature
+    pub channel: String,
+    /// unit of what is stated below
+    pub unit: String,
+    /// root mean square
+    pub rms: f64,
+    /// Ljung–Box finds no memory in it at 1 %
+    pub white: bool,
+    /// autocorrelation at lags 0, 1, … samples
+    pub autocorrelation: Vec<f64>,
+    /// white noise stays within ± this at 99 % of the lags
+    pub band99: f64,
+    /// harmonics of the pattern and of the table
+    pub harmonics: Vec<ChannelHarmonic>,
+    /// the strongest line in time that is none of these, if it is no accident
+    pub line: Option<ChannelLine>,
+    /// rms of a slow change of every run, if it is no accident
+    pub drift_rms: Option<f64>,
+}
+
+/// One harmonic of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ChannelHarmonic {
+    /// what it follows
+    pub of: Follows,
+    /// harmonic number
+    pub n: u32,
+    /// amplitude
+    pub amplitude: f64,
+    /// half width of the 95 % interval of either quadrature component
+    pub ci95: f64,
+    /// phase of A cos(nθ + phase), deg
+    pub phase_deg: f64,
+    /// how it goes from run to run, where it is large enough to tell
+    pub scaling: Option<HarmonicScaling>,
+}
+
+/// How a harmonic goes with what differs between runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HarmonicScaling {
+    /// exponent of the rate; null where the runs have one
+    pub rate: Option<Exponent>,
+    /// exponent of the amplitude; null where the runs have one
+    pub amplitude: Option<Exponent>,
+    /// it changes its sign with the direction; null where the runs have one
+    pub turns_with_direction: Option<bool>,
+}
+
+/// An exponent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Exponent {
+    /// value
+    pub value: f64,
+    /// half width of its 95 % interval
+    pub ci95: f64,
+}
+
+/// A line in time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ChannelLine {
+    /// frequency, Hz
+    pub frequency_hz: f64,
+    /// root mean square
+    pub rms: f64,
+}
+
+/// The held-out error after one step from the raw angle to the last effect, with what speaks for the step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StepReport {
+    /// raw, declared, discovered or empirical
+    pub stage: String,
+    /// the effect that came in; null for raw and declared
+    pub effect: Option<String>,
+    /// size of the held-out error after it
+    pub heldout: ErrorSize,
+    /// harmonics of the pattern in the held-out error after it
+    pub harmonics: Vec<Harmonic>,
+    /// what the effect leaves in the channels, by its definition
+    pub signature: Option<String>,
+    /// gain in 2 ln likelihood after the price of its parameters and of the search
+    pub gain: Option<f64>,
+    /// those that it beat
+    pub rivals: Vec<Rival>,
+    /// rms of what the energy balance leaves of ln a, before and after
+    pub energy_balance: Option<[f64; 2]>,
+    /// why a cause is not claimed
+    pub doubt: Option<String>,
+}
+
+/// An effect that was beaten.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rival {
+    /// identifier in the effect library
+    pub id: String,
+    /// by how much, in 2 ln likelihood
+    pub beaten_by: f64,
+}
+
 /// A feature of the residual that nothing explains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
@@ -148,8 +251,12 @@ pub struct Report {
     pub effects: Vec<EffectReport>,
     /// held-out errors
     pub heldout: Heldout,
+    /// from the raw angle to the last effect, on the held-out data
+    pub steps: Vec<StepReport>,
     /// what is left
     pub residual: ResidualReport,
+    /// what is left in each channel of the fitted runs, under the declared model and after all
+    pub channels: Vec<ChannelReport>,
     /// what is left and has no explanation
     pub unexplained: Vec<Unexplained>,
     /// the campaign's runs

@@ -36,7 +36,7 @@ pub struct Harmonic {
 
 impl Residual {
     /// The angle that a harmonic follows, per sample.
-    fn base(&self, of: Follows) -> &[f64] {
+    pub(crate) fn base(&self, of: Follows) -> &[f64] {
         match of {
             Follows::Pattern => &self.direction,
             Follows::Table => &self.table,
@@ -121,6 +121,8 @@ pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u3
 
 /// Samples of a segment that refine a frequency.
 const REFINED_SAMPLES: usize = 2_000;
+/// Steps of that: half as many halve the width of a line each.
+const REFINEMENTS: usize = 14;
 
 /// Along what a line is periodic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -200,16 +202,13 @@ pub(crate) fn strongest_line(evaluation: &Evaluation, along: Along) -> Option<(f
         line.power()
     };
     let mut best = (peak as f64 * df, at(peak as f64 * df));
-    let mut width = df;
-    for _ in 0..6 {
-        for k in -4..=4 {
-            let f = best.0 + 0.25 * f64::from(k) * width;
-            let p = if f > 0.0 { at(f) } else { 0.0 };
-            if p > best.1 {
-                best = (f, p);
-            }
+    let mut step = 0.5 * df;
+    for _ in 0..REFINEMENTS {
+        let around = [best.0 - step, best.0 + step].map(|f| (f, if f > 0.0 { at(f) } else { 0.0 }));
+        match around.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some(better) if better.1 > best.1 => best = better,
+            _ => step *= 0.5,
         }
-        width *= 0.4;
     }
     Some(best)
 }
@@ -243,10 +242,11 @@ pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflati
     let mut row = vec![0.0; n];
     for (s, kept) in evaluation.segments.iter().zip(&evaluation.kept) {
         for i in (0..s.angle.len()).filter(|&i| kept[i]) {
-            for k in 0..most as usize {
-                let (sin, cos) = ((k + 1) as f64 * s.base(of)[i]).sin_cos();
-                row[2 * k] = cos;
-                row[2 * k + 1] = sin;
+            let (sin, cos) = s.base(of)[i].sin_cos();
+            let (mut sin_n, mut cos_n) = (sin, cos);
+            for pair in row.chunks_exact_mut(2) {
+                pair.copy_from_slice(&[cos_n, sin_n]);
+                (sin_n, cos_n) = (sin_n * cos + cos_n * sin, cos_n * cos - sin_n * sin);
             }
             for a in 0..n {
                 for b in 0..=a {
@@ -279,6 +279,20 @@ pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflati
         .collect()
 }
 
+/// Harmonics that are reported.
+const REPORTED_HARMONICS: u32 = 8;
+
+/// The first harmonics of the pattern, with intervals that allow for memory.
+pub(crate) fn pattern_harmonics(evaluation: &Evaluation) -> Vec<Harmonic> {
+    reported_harmonics(evaluation, Follows::Pattern, evaluation)
+}
+
+/// The first harmonics of the pattern or the table, with intervals that allow for the memory of `noise`.
+pub(crate) fn reported_harmonics(evaluation: &Evaluation, of: Follows, noise: &Evaluation) -> Vec<Harmonic> {
+    let inflated = inflation(&autocorrelation(noise, WHITENESS_LAGS), noise.errors().count());
+    harmonics(evaluation, of, resolved_harmonics(evaluation, of, REPORTED_HARMONICS), inflated)
+}
+
 /// Autocorrelation of the errors at lags 0 to `most`, pooled over segments.
 pub(crate) fn autocorrelation(evaluation: &Evaluation, most: usize) -> Vec<f64> {
     let mut sums = vec![0.0; most + 1];
@@ -295,8 +309,9 @@ pub(crate) fn autocorrelation(evaluation: &Evaluation, most: usize) -> Vec<f64> 
     sums.into_iter().map(|s| s / zero).collect()
 }
 
-/// Lags of the whiteness test.
+/// Lags of the whiteness test, and its significance.
 pub(crate) const WHITENESS_LAGS: usize = 20;
+pub(crate) const WHITENESS_LEVEL: f64 = 0.01;
 
 /// Ljung–Box: the probability of so much autocorrelation in `count` samples of white noise.
 pub(crate) fn ljung_box(correlation: &[f64], count: usize) -> f64 {
