@@ -8,8 +8,11 @@
 //! `x_twin`: the same claim with an error planted in it, which passes where the engine refutes it.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "recordings")]
 pub mod bench;
+#[cfg(feature = "recordings")]
 pub mod blind;
+#[cfg(feature = "recordings")]
 pub mod carrier;
 pub mod domain;
 pub mod proof;
@@ -21,14 +24,17 @@ pub use cvg_model as model;
 pub use scalar::Scalar;
 pub use tolerances::Tolerance;
 
-use proptest::test_runner::{Config, FileFailurePersistence};
+use proptest::test_runner::{Config, FailurePersistence, FileFailurePersistence};
 
-/// How the random tests run: a counter-example that was found once is kept beside the test and tried first.
+/// How the random tests run: a counter-example that was found once is kept beside the test and tried first, unless
+/// `PROPTEST_DISABLE_FAILURE_PERSISTENCE` is set.
 pub fn config() -> Config {
+    let default = Config::default();
+    let beside = |_| Box::new(FileFailurePersistence::WithSource("regressions")) as Box<dyn FailurePersistence>;
     Config {
-        failure_persistence: Some(Box::new(FileFailurePersistence::WithSource("regressions"))),
+        failure_persistence: default.failure_persistence.clone().map(beside),
         max_global_rejects: 1 << 20,
-        ..Config::default()
+        ..default
     }
 }
 

@@ -49,6 +49,7 @@ fn rounding<T: cvg_tests::Scalar>(window: u16) -> f64 {
 
 for_each_scalar! {
     //= specs/dsp.md#carrier-rejection
+    //= type=test
     //# A stationary carrier MUST be demodulated to its envelope whatever the number of samples in a window and whatever the offset of the converter.
     #[test]
     fn prop_a_stationary_carrier_is_demodulated_exactly(
@@ -66,6 +67,7 @@ for_each_scalar! {
     }
 
     //= specs/dsp.md#group-delay
+    //= type=test
     //# An envelope that changes evenly MUST be measured as it is at the middle of its window.
     #[test]
     fn prop_an_envelope_is_that_of_the_middle_of_its_window(
@@ -85,6 +87,7 @@ for_each_scalar! {
     }
 
     //= specs/dsp.md#unwrapping
+    //= type=test
     //# The unwrapped angle MUST follow a turning pattern through any number of half turns without a jump.
     #[test]
     fn prop_the_angle_is_unwrapped_through_any_number_of_turns(
@@ -104,6 +107,7 @@ for_each_scalar! {
     }
 
     //= specs/dsp.md#bounded-commands
+    //= type=test
     //# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
     #[test]
     fn prop_no_input_and_no_state_makes_a_command_without_bounds(
@@ -186,6 +190,7 @@ const TUNED: Tuning = Tuning { bandwidth_hz: 4.0, damping: 0.6 };
 const OFF_THE_LAW: f64 = 0.05;
 
 //= specs/dsp.md#tuning
+//= type=test
 //# A disturbance of a loop MUST decay with the natural frequency and the damping ratio that the loop was tuned to.
 #[test]
 fn each_loop_answers_a_disturbance_as_it_was_tuned() {

@@ -118,6 +118,22 @@ for_each_scalar! {
     }
 }
 
+proptest! {
+    #![proptest_config(cvg_tests::config())]
+
+    /// The rate of the angle of an orbit that turns and decays, against the difference of two angles.
+    #[test]
+    fn prop_the_precession_is_the_rate_of_the_angle(o in orbits(), turning in -2.0..2.0_f64, decay in -0.5..0.5_f64) {
+        prop_assume!(o.q.abs() < 0.8 * o.a);
+        let e = o.envelope();
+        let rate = Envelope::new(-turning * e.y_c, -turning * e.y_s, turning * e.x_c, turning * e.x_s) + e * decay;
+        prop_assert_near!(e.precession(&rate), turning, 1e-12 * condition(&e.pendulum()));
+        let step = 1e-5;
+        let later = (e + rate * step).pendulum().angle() - (e + rate * -step).pendulum().angle();
+        prop_assert_near!(wrapped(later, PI) / (2.0 * step), turning, 1e-7);
+    }
+}
+
 //= specs/equation-04.md#circle
 //= type=test
 //# The angle of a circular orbit MUST be zero.

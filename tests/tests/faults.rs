@@ -93,10 +93,16 @@ macro_rules! fault {
                 $happens
                 ends_as_said($l, &$row, $channel);
             }
+            //= specs/dsp.md#recovery
+            //= type=test
+            //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
             #[test]
             fn in_f32() {
                 ends::<f32>();
             }
+            //= specs/dsp.md#recovery
+            //= type=test
+            //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
             #[test]
             fn in_f64() {
                 ends::<f64>();
@@ -242,8 +248,6 @@ const ROWS: &[&Row] = &[
     &OVERWRITTEN,
 ];
 
-//= specs/dsp.md#recovery
-//# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
 #[test]
 fn the_documentation_has_a_row_for_every_fault_with_its_ending_and_its_time() {
     let page =

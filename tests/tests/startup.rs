@@ -15,6 +15,7 @@ fn summary(endings: &[Ending]) -> (usize, usize, f64) {
 }
 
 //= specs/dsp.md#start
+//= type=test
 //# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
 /// `CVG_TRIALS=1000 cargo test --release -p cvg-tests --test startup -- --nocapture` is the full count.
 #[test]

@@ -13,7 +13,8 @@ mod source;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs]";
+const USAGE: &str =
+    "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER]";
 
 /// What a task returns: whether everything held, or why it could not be found out.
 type Outcome = Result<bool, String>;
@@ -23,14 +24,28 @@ fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(Path::to_owned).unwrap_or_default()
 }
 
+/// What `cargo xtask audit` is asked for.
+fn request<'a>(options: &[&'a str]) -> Option<audit::Request<'a>> {
+    let mut request = audit::Request::default();
+    let mut options = options.iter();
+    while let Some(option) = options.next() {
+        match *option {
+            "--keep-proofs" => request.keep_proofs = true,
+            "--only" => request.only = Some(options.next()?),
+            "--out" => request.folder = Some(options.next()?),
+            _ => return None,
+        }
+    }
+    Some(request)
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments[..] {
         ["prove"] => prove::run(None),
         ["prove", "--only", text] => prove::run(Some(text)),
-        ["audit"] => audit::run(false),
-        ["audit", "--keep-proofs"] => audit::run(true),
+        ["audit", ref options @ ..] => request(options).map_or_else(|| Err(USAGE.to_owned()), audit::run),
         _ => Err(USAGE.to_owned()),
     };
     match outcome {
