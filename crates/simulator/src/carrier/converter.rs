@@ -33,12 +33,16 @@ impl Plates {
 }
 
 /// Quantisation and range of a converter, either way.
+///
+/// The order of its numbers is kept: the one that is wanted twice in a register is loaded together with what follows it,
+/// and must not be followed by something that was just written.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Converter {
-    range_v: f64,
+    per_step: f64,
     /// 0 for a converter without steps
     step_v: f64,
-    per_step: f64,
+    range_v: f64,
 }
 
 /// Adding and taking away 1.5 · 2⁵² rounds to the nearest integer, ties to even, without a call.

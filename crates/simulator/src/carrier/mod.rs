@@ -87,7 +87,8 @@ pub struct CarrierLoop<T> {
     noise: ChannelNoise,
     adc: Converter,
     dac: Converter,
-    output_v: [f64; 2],
+    /// the outputs, each twice as a product with pairs wants it: written and read in the same pieces
+    output_v: [[f64; 2]; 2],
 }
 
 impl<T: Float> CarrierLoop<T> {
@@ -114,7 +115,7 @@ impl<T: Float> CarrierLoop<T> {
             noise: ChannelNoise::new(device.noise_v, Noise::new(device.seed, 0)),
             adc: Converter::new(device.adc.0, device.adc.1),
             dac: Converter::new(device.dac.0, device.dac.1),
-            output_v: [0.0; 2],
+            output_v: [[0.0; 2]; 2],
         })
     }
 
@@ -125,7 +126,7 @@ impl<T: Float> CarrierLoop<T> {
 
     /// The drives' outputs now, V.
     pub fn output_v(&self) -> [f64; 2] {
-        self.output_v
+        self.output_v.map(|[v, _]| v)
     }
 
     /// What the converters read in the state `vibration`, V.
@@ -155,13 +156,13 @@ impl<T: Float> CarrierLoop<T> {
         let (dac_x, dac_y, status) = self.instrument.step(&mut self.state, x, y);
         let next = [self.dac.convert(dac_x.to_f64()), self.dac.convert(dac_y.to_f64())];
         self.plant.step_from(vibration, before, next);
-        self.output_v = next;
+        self.output_v = next.map(|v| [v; 2]);
         status
     }
 
     /// One sample in which the electronics stand still and the drives hold their output.
     pub fn step_without_electronics(&mut self) {
         let _ = self.readout(self.plant.state());
-        self.plant.step(self.output_v, self.output_v);
+        self.plant.step(self.output_v(), self.output_v());
     }
 }
