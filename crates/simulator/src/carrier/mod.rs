@@ -135,7 +135,8 @@ impl<T: Float> CarrierLoop<T> {
         // late: the displacement as it was a part of a period ago, but for what losses, splits and rates do in it
         let x = self.late_cos * x - self.late_sin * p_x;
         let y = self.late_cos * y - self.late_sin * p_y;
-        let volts = [self.plates[0].volts(x) + self.offset_v[0], self.plates[1].volts(y) + self.offset_v[1]];
+        let [v_x, v_y] = Plates::volts(&self.plates, [x, y]);
+        let volts = [v_x + self.offset_v[0], v_y + self.offset_v[1]];
         self.noise.add(volts).map(|v| self.adc.convert(v))
     }
 
