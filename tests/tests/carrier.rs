@@ -332,14 +332,15 @@ fn the_plates_cubic_part_is_one_over_the_gap_squared() {
     let third: f64 = (0..n)
         .map(|i| {
             let phase = TAU * f64::from(i) / f64::from(n);
-            plates.volts(phase.cos()) * (3.0 * phase).cos()
+            Plates::volts(&[plates; 2], [phase.cos(), 0.0])[0] * (3.0 * phase).cos()
         })
         .sum::<f64>()
         * 2.0
         / f64::from(n);
     let kappa = 1.0 / (gap * gap);
     approx::assert_relative_eq!(third, 2.0 * (kappa / 4.0 + 5.0 * kappa * kappa / 16.0), max_relative = 1e-4);
-    assert!(plates.volts(20.0).is_finite() && plates.volts(-20.0) == -plates.volts(20.0));
+    let [up, down] = Plates::volts(&[plates; 2], [20.0, -20.0]);
+    assert!(up.is_finite() && down == -up);
 }
 
 proptest! {

@@ -20,25 +20,38 @@ impl Plates {
         Self { gain, inverse_gap_2: 1.0 / (gap * gap) }
     }
 
-    /// Volts at the displacement `x`. Stops keep the plates from touching: the motion they see ends at 0.95 of the gap.
+    /// Volts of both axes at their displacements. Stops keep the plates from touching: the motion they see ends at 0.95 of
+    /// the gap. Away from them the two divisions are one.
     #[inline]
-    pub fn volts(&self, x: f64) -> f64 {
-        let closed = x * x * self.inverse_gap_2;
-        if closed < 0.9025 {
-            self.gain * x / (1.0 - closed)
+    pub fn volts([of_x, of_y]: &[Self; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+        let closed = [x * x * of_x.inverse_gap_2, y * y * of_y.inverse_gap_2];
+        if closed[0] < 0.9025 && closed[1] < 0.9025 {
+            [of_x.gain * x / (1.0 - closed[0]), of_y.gain * y / (1.0 - closed[1])]
         } else {
-            self.gain * (0.95 / self.inverse_gap_2.sqrt()).copysign(x) / (1.0 - 0.9025)
+            [of_x.at_most(x), of_y.at_most(y)]
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn at_most(&self, x: f64) -> f64 {
+        let end = 0.95 / self.inverse_gap_2.sqrt();
+        let x = if x.abs() < end { x } else { end.copysign(x) };
+        self.gain * x / (1.0 - x * x * self.inverse_gap_2)
     }
 }
 
 /// Quantisation and range of a converter, either way.
+///
+/// The order of its numbers is kept: the one that is wanted twice in a register is loaded together with what follows it,
+/// and must not be followed by something that was just written.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Converter {
-    range_v: f64,
+    per_step: f64,
     /// 0 for a converter without steps
     step_v: f64,
-    per_step: f64,
+    range_v: f64,
 }
 
 /// Adding and taking away 1.5 · 2⁵² rounds to the nearest integer, ties to even, without a call.

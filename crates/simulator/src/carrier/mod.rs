@@ -87,7 +87,8 @@ pub struct CarrierLoop<T> {
     noise: ChannelNoise,
     adc: Converter,
     dac: Converter,
-    output_v: [f64; 2],
+    /// the outputs, each twice as a product with pairs wants it: written and read in the same pieces
+    output_v: [[f64; 2]; 2],
 }
 
 impl<T: Float> CarrierLoop<T> {
@@ -114,7 +115,7 @@ impl<T: Float> CarrierLoop<T> {
             noise: ChannelNoise::new(device.noise_v, Noise::new(device.seed, 0)),
             adc: Converter::new(device.adc.0, device.adc.1),
             dac: Converter::new(device.dac.0, device.dac.1),
-            output_v: [0.0; 2],
+            output_v: [[0.0; 2]; 2],
         })
     }
 
@@ -125,7 +126,7 @@ impl<T: Float> CarrierLoop<T> {
 
     /// The drives' outputs now, V.
     pub fn output_v(&self) -> [f64; 2] {
-        self.output_v
+        self.output_v.map(|[v, _]| v)
     }
 
     /// What the converters read in the state `vibration`, V.
@@ -134,7 +135,8 @@ impl<T: Float> CarrierLoop<T> {
         // late: the displacement as it was a part of a period ago, but for what losses, splits and rates do in it
         let x = self.late_cos * x - self.late_sin * p_x;
         let y = self.late_cos * y - self.late_sin * p_y;
-        let volts = [self.plates[0].volts(x) + self.offset_v[0], self.plates[1].volts(y) + self.offset_v[1]];
+        let [v_x, v_y] = Plates::volts(&self.plates, [x, y]);
+        let volts = [v_x + self.offset_v[0], v_y + self.offset_v[1]];
         self.noise.add(volts).map(|v| self.adc.convert(v))
     }
 
@@ -155,13 +157,13 @@ impl<T: Float> CarrierLoop<T> {
         let (dac_x, dac_y, status) = self.instrument.step(&mut self.state, x, y);
         let next = [self.dac.convert(dac_x.to_f64()), self.dac.convert(dac_y.to_f64())];
         self.plant.step_from(vibration, before, next);
-        self.output_v = next;
+        self.output_v = next.map(|v| [v; 2]);
         status
     }
 
     /// One sample in which the electronics stand still and the drives hold their output.
     pub fn step_without_electronics(&mut self) {
         let _ = self.readout(self.plant.state());
-        self.plant.step(self.output_v, self.output_v);
+        self.plant.step(self.output_v(), self.output_v());
     }
 }

@@ -86,12 +86,13 @@ impl CarrierPlant {
     /// One sample at the rate that is set: the drives hold `before` until their output changes, then `after`, V.
     #[inline]
     pub fn step(&mut self, before: [f64; 2], after: [f64; 2]) {
-        self.step_from(self.vibration, before, after);
+        self.step_from(self.vibration, before.map(|v| [v; 2]), after);
     }
 
-    /// The same from a copy of the state that was taken before: whoever read it has it in registers.
+    /// The same from a copy of the state that was taken before: whoever read it has it in registers. Each of `before` is
+    /// given twice.
     #[inline]
-    pub(super) fn step_from(&mut self, vibration: [f64; 4], before: [f64; 2], after: [f64; 2]) {
+    pub(super) fn step_from(&mut self, vibration: [f64; 4], before: [[f64; 2]; 2], after: [f64; 2]) {
         self.vibration = self.at_rate.apply(&vibration, before, after);
     }
 
@@ -105,7 +106,7 @@ impl CarrierPlant {
     #[inline]
     pub fn step_at(&mut self, rate_rad_s: f64, before: [f64; 2], after: [f64; 2]) {
         let turned = self.half_turn(self.vibration, rate_rad_s);
-        let moved = self.still.apply(&turned, before, after);
+        let moved = self.still.apply(&turned, before.map(|v| [v; 2]), after);
         self.vibration = self.half_turn(moved, rate_rad_s);
     }
 
@@ -174,11 +175,11 @@ impl Transition {
     }
 
     #[inline]
-    fn apply(&self, z: &[f64; 4], before: [f64; 2], after: [f64; 2]) -> [f64; 4] {
+    fn apply(&self, z: &[f64; 4], before: [[f64; 2]; 2], after: [f64; 2]) -> [f64; 4] {
         std::array::from_fn(|i| {
             let free =
                 (self.free[0][i] * z[0] + self.free[1][i] * z[1]) + (self.free[2][i] * z[2] + self.free[3][i] * z[3]);
-            let first = self.before[0][i] * before[0] + self.before[1][i] * before[1];
+            let first = self.before[0][i] * before[0][i % 2] + self.before[1][i] * before[1][i % 2];
             let second = self.after[0][i] * after[0] + self.after[1][i] * after[1];
             free + (first + second)
         })
