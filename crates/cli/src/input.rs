@@ -102,7 +102,7 @@ pub(crate) fn campaign(
 }
 
 /// Whether the input is recorded and never anything but the same.
-fn stands_still(recording: &Recording) -> bool {
+pub(crate) fn stands_still(recording: &Recording) -> bool {
     let rates = recording.rate_dps.as_deref().is_some_and(|v| v.iter().all(|rate| *rate == 0.0 || rate.is_nan()));
     let table = recording.table_deg.as_deref();
     table.map_or(rates, |v| v.iter().all(|angle| Some(angle) == v.first() || angle.is_nan()))

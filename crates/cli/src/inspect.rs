@@ -107,8 +107,12 @@ fn uses(recording: &Recording) -> Vec<String> {
         Ok(()) => format!("serves as {kind}"),
         Err(_) => format!("does not serve as {kind}"),
     };
-    let mut out =
-        vec![say("a rotation", recording.require_rotation()), say("a ring-down", recording.require_ringdown())];
+    let rotation = if recording.require_rotation().is_ok() && input::stands_still(recording) {
+        "does not serve as a rotation: the table does not turn".to_owned()
+    } else {
+        say("a rotation", recording.require_rotation())
+    };
+    let mut out = vec![rotation, say("a ring-down", recording.require_ringdown())];
     if recording.vas_v.is_none() || recording.vqc_v.is_none() {
         out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
     }
@@ -168,7 +172,7 @@ fn as_value(recording: &Recording) -> Value {
         "rows_dropped": recording.dropped.rows_dropped(), "duration_s": duration_s, "interval_s": interval_s,
         "largest_interval_s": largest_interval_s, "columns": columns,
         "unknown_columns": recording.unknown.iter().map(|u| u.name.as_str()).collect::<Vec<_>>(),
-        "rotation": recording.require_rotation().is_ok(), "ringdown": recording.require_ringdown().is_ok(),
+        "rotation": recording.require_rotation().is_ok() && !input::stands_still(recording), "ringdown": recording.require_ringdown().is_ok(),
         "warnings": recording.warnings,
     })
 }

@@ -133,6 +133,9 @@ fn inspect_says_what_is_in_a_file_and_what_is_wrong_with_it() {
     assert_eq!((facts[0]["rotation"].as_bool(), facts[0]["rows_dropped"].as_u64()), (Some(true), Some(1)));
     let campaign = bench.campaign();
     assert!(cvg_ok(&[OsStr::new("inspect"), campaign.as_os_str()]).contains("runs"));
+    let still = bench.path("ringdown-0.csv");
+    let said = cvg_ok(&[OsStr::new("inspect"), still.as_os_str()]);
+    assert!(said.contains("the table does not turn") && said.contains("serves as a ring-down"), "{said}");
 }
 
 #[test]
