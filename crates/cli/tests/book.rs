@@ -17,7 +17,7 @@ fn repository() -> PathBuf {
 }
 
 fn page(name: &str) -> String {
-    fs::read_to_string(repository().join(name)).unwrap()
+    fs::read_to_string(repository().join(name)).unwrap().replace("\r\n", "\n")
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn calls() -> Vec<(String, String)> {
     pages.push(repository().join("README.md"));
     let mut found = Vec::new();
     for path in pages {
-        let text = fs::read_to_string(&path).unwrap();
+        let text = fs::read_to_string(&path).unwrap().replace("\r\n", "\n");
         for block in text.split("```sh\n").skip(1) {
             for line in block.split("```").next().unwrap().lines() {
                 let line = line.split("  #").next().unwrap();
