@@ -27,16 +27,16 @@ pub(crate) fn inspect(
         let recordings = if input::is_campaign(&file) {
             let campaign = Campaign::open_named(&file, naming).map_err(input::explained)?;
             if !as_json {
-                println!("{}: {}, {} runs", file.display(), campaign.device, campaign.runs.len());
+                output::answer(&format!("{}: {}, {} runs\n", file.display(), campaign.device, campaign.runs.len()))?;
                 for w in &campaign.warnings {
-                    println!("  warning: {w}");
+                    output::answer(&format!("  warning: {w}\n"))?;
                 }
             }
             campaign.runs.into_iter().map(|run| (Some(run.kind), run.recording)).collect()
         } else {
             let read = input::read(&file, naming);
             if let (false, Err(error)) = (as_json, &read) {
-                print!("{}", unnamed(&file, error));
+                output::answer(&unnamed(&file, error))?;
             }
             vec![(None, read.map_err(input::explained)?)]
         };
@@ -48,12 +48,12 @@ pub(crate) fn inspect(
             if as_json {
                 facts.push(as_value(&recording));
             } else {
-                print!("{}", in_words(&recording, kind));
+                output::answer(&in_words(&recording, kind))?;
             }
         }
     }
     if as_json {
-        println!("{}", serde_json::to_string_pretty(&facts).map_err(Failure::input)?);
+        output::answer(&format!("{}\n", serde_json::to_string_pretty(&facts).map_err(Failure::input)?))?;
     }
     Ok(())
 }
@@ -219,6 +219,6 @@ fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
     } else {
         output::write(path, plot(x, y, &series)?.as_bytes())?;
     }
-    eprintln!("wrote {}", path.display());
+    output::tell(format_args!("wrote {}", path.display()));
     Ok(())
 }
