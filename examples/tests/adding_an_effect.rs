@@ -55,6 +55,11 @@ fn patched(text: &str, difference: &str) -> Result<String> {
     }
 }
 
+/// A text of the repository, whatever ends its lines here.
+fn text(path: &Path) -> Result<String> {
+    Ok(fs::read_to_string(path)?.replace("\r\n", "\n"))
+}
+
 fn copy(from: &Path, to: &Path) -> Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
@@ -80,14 +85,14 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
     for name in ["Cargo.toml", "Cargo.lock"] {
         fs::copy(root.join(name), folder.path().join(name))?;
     }
-    let blocks = blocks(&fs::read_to_string(root.join(PAGE))?);
+    let blocks = blocks(&text(&root.join(PAGE))?);
     assert_eq!(blocks.len(), 6, "{PAGE} has lost a block: {blocks:?}");
     for block in blocks {
         match block {
             Block::File(path, text) => fs::write(folder.path().join(path), text)?,
             Block::Insert(path, difference) => {
                 let path = folder.path().join(path);
-                fs::write(&path, patched(&fs::read_to_string(&path)?, &difference)?)?;
+                fs::write(&path, patched(&text(&path)?, &difference)?)?;
             }
         }
     }

@@ -17,6 +17,18 @@ pub const SCHEMA: &str = "cvg.calibration/1";
 const CHECKSUM: &str = "checksum = \"crc32:";
 
 /// An identified instrument, ready to be compensated.
+///
+/// ```
+/// use cvg_calibration::recording::Instrument;
+/// use cvg_calibration::{Hypothesis, calibration::Calibration};
+///
+/// let hypothesis = Hypothesis::ideal(Instrument::Gyroscope, core::f64::consts::PI, 0.78);
+/// let text = Calibration { device: "dfp-7".into(), hypothesis }.to_text();
+/// assert_eq!(Calibration::from_text(&text, "calibration.toml")?.device, "dfp-7");
+/// // what was changed afterwards is refused
+/// assert!(Calibration::from_text(&text.replace("0.78", "0.79"), "calibration.toml").is_err());
+/// # Ok::<(), cvg_calibration::Refusal>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// name of the instrument

@@ -15,6 +15,15 @@ use crate::track::{Track, wrapped};
 /// Changed are `xc_v`, `xs_v`, `yc_v`, `ys_v` and `theta_deg`, as far as they are there; `rate_dps` or `table_deg` only
 /// where an input effect was identified. All else is kept.
 ///
+/// ```no_run
+/// use cvg_calibration::{calibration::Calibration, compensate, recording::Recording};
+///
+/// let calibration = Calibration::read("results/calibration.toml".as_ref())?;
+/// let clean = compensate(&calibration, &Recording::read("rot.csv".as_ref()).expect("a recording"))?;
+/// println!("{} rows", clean.len());
+/// # Ok::<(), cvg_calibration::Refusal>(())
+/// ```
+///
 /// # Errors
 /// Where the recording has no angle or no reference.
 pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Recording, Refusal> {

@@ -109,7 +109,7 @@ fn unknown_keys_are_refused_with_the_known_ones() {
     let text = headed(&format!("{RUN}settle = 1\n"));
     assert_refused(&text, &["line 6, column 1", "the key `settle` has no meaning in a rotation run", "`settle_s`"]);
     assert_refused(&headed(&format!("carrier = 1\n{RUN}")), &["line 3", "`carrier`", "`carrier_hz`"]);
-    assert_refused(&format!("{}[extra]\n", headed(RUN)), &["line 6", "`extra`", "one of `campaign`, `run`"]);
+    assert_refused(&format!("{}[extra]\n", headed(RUN)), &["line 6", "`extra`", "one of `campaign`, `columns`, `run`"]);
     assert_refused(&headed(&format!("{RUN}angle_deg = 1\n")), &["`angle_deg` has no meaning in a rotation run"]);
 }
 

@@ -60,7 +60,7 @@ Examples:
 #[derive(Args, Clone, Default)]
 pub(crate) struct Mapping {
     /// Which column is which channel, for files with names of their own; a factor takes its unit to the channel's. Or a
-    /// campaign.toml whose [columns] say it
+    /// campaign.toml, whose table `columns` says it
     #[arg(long = "map", value_name = "CHANNEL=COLUMN[*FACTOR]")]
     entries: Vec<String>,
 }

@@ -23,7 +23,7 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     progress.say("simulating");
     parsed.simulate().write(out).map_err(Failure::input)?;
     drop(progress);
-    eprintln!("wrote {}", out.join("campaign.toml").display());
+    output::tell(format_args!("wrote {}", out.join("campaign.toml").display()));
     Ok(())
 }
 
@@ -47,12 +47,12 @@ pub(crate) fn identify(
     let identified = run(open)?;
     if let Some(out) = out {
         write_results(&identified, out)?;
-        eprintln!("wrote {}", out.join("report.html").display());
+        output::tell(format_args!("wrote {}", out.join("report.html").display()));
     }
     if json {
-        println!("{}", report_json(&identified)?);
+        output::answer(&format!("{}\n", report_json(&identified)?))?;
     } else {
-        print!("{}", summary(&identified));
+        output::answer(&summary(&identified))?;
     }
     Ok(())
 }
@@ -86,7 +86,7 @@ pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, namin
     let recording = input::recording(recording, naming)?;
     recording.require_rotation()?;
     for w in &recording.warnings {
-        eprintln!("warning: {w}");
+        output::tell(format_args!("warning: {w}"));
     }
     let compensated = cvg_calibration::compensate(&calibration, &recording)?;
     let mut bytes = Vec::new();
@@ -97,7 +97,7 @@ pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, namin
     }
     .map_err(|e| Failure::input(format!("{}: {e}", out.display())))?;
     output::write(out, &bytes)?;
-    eprintln!("wrote {}", out.display());
+    output::tell(format_args!("wrote {}", out.display()));
     Ok(())
 }
 
@@ -118,7 +118,7 @@ pub(crate) fn manual(out: &Path) -> Result<(), Failure> {
     }
     let files: Vec<_> = written.iter().map(|(path, page)| (path.clone(), page.as_slice())).collect();
     output::write_all(&files)?;
-    eprintln!("wrote {} pages into {}", files.len(), out.display());
+    output::tell(format_args!("wrote {} pages into {}", files.len(), out.display()));
     Ok(())
 }
 

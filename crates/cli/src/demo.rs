@@ -15,19 +15,19 @@ const README_POINTS: usize = 900;
 pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
     output::check_folder(out)?;
     let campaign = out.join("campaign");
-    eprintln!("simulating the paper's device into {}", campaign.display());
+    output::tell(format_args!("simulating the paper's device into {}", campaign.display()));
     Scenario::paper().simulate().write(&campaign).map_err(Failure::input)?;
-    eprintln!("identifying it from its recordings");
+    output::tell(format_args!("identifying it from its recordings"));
     let identified = commands::run(|| Ok(Campaign::open(&campaign.join("campaign.toml"))?))?;
     commands::write_results(&identified, out)?;
     output::write(&out.join("bias.svg"), clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
     if json {
-        println!("{}", commands::report_json(&identified)?);
+        output::answer(&format!("{}\n", commands::report_json(&identified)?))?;
         return Ok(());
     }
-    print!("{}", commands::summary(&identified));
-    print!("{}", beside_the_paper(&identified));
-    eprintln!("wrote {}", out.join("report.html").display());
+    output::answer(&commands::summary(&identified))?;
+    output::answer(&beside_the_paper(&identified))?;
+    output::tell(format_args!("wrote {}", out.join("report.html").display()));
     Ok(())
 }
 

@@ -16,12 +16,42 @@ fn is_standard_input(path: &Path) -> bool {
 
 /// Reads a recording from a file, or from standard input for `-`.
 pub(crate) fn recording(path: &Path, naming: &Naming) -> Result<Recording, Failure> {
-    let read = if is_standard_input(path) {
+    read(path, naming).map_err(explained)
+}
+
+/// [`recording`], with what is wrong as the reader says it.
+pub(crate) fn read(path: &Path, naming: &Naming) -> Result<Recording, ReadError> {
+    if is_standard_input(path) {
         Recording::read_from(std::io::stdin(), naming, Path::new(STANDARD_INPUT))
     } else {
         Recording::read_named(path, naming)
-    };
-    read.map_err(explained)
+    }
+}
+
+/// The columns of a file that names none of ours, as far as they are numbers over a first column that grows: for people
+/// to tell which is which.
+pub(crate) fn foreign_columns(path: &Path, error: &ReadError) -> Option<Vec<(String, Vec<f64>)>> {
+    let ReadError::MissingColumns { present, .. } = error else { return None };
+    if is_standard_input(path) {
+        return None;
+    }
+    let names: Vec<&str> = present.split('`').skip(1).step_by(2).collect();
+    let [first, second, ..] = names.as_slice() else { return None };
+    let mut naming = Naming::default();
+    // the second stands in for an angle, so that the file is read at all
+    naming.add(&format!("t_s={first}")).ok()?;
+    naming.add(&format!("theta_deg={second}")).ok()?;
+    let read = Recording::read_named(path, &naming).ok()?;
+    let number = |text: &str| text.trim().replace(',', ".").parse().unwrap_or(f64::NAN);
+    let mut columns = vec![((*first).to_owned(), read.t_s.clone())];
+    columns.extend(read.channel(Channel::Theta).map(|v| ((*second).to_owned(), v.to_vec())));
+    let ours = Channel::ALL.into_iter().filter(|c| ![Channel::Time, Channel::Theta].contains(c));
+    columns.extend(ours.filter_map(|c| Some((c.name().to_owned(), read.channel(c)?.to_vec()))));
+    for unknown in &read.unknown {
+        let values: Vec<f64> = (0..read.len()).map(|row| number(unknown.cells.get(row).unwrap_or_default())).collect();
+        columns.push((unknown.name.clone(), values));
+    }
+    Some(columns)
 }
 
 /// The files that names and patterns stand for. A name that exists is itself, whatever signs are in it.
@@ -102,7 +132,7 @@ pub(crate) fn campaign(
 }
 
 /// Whether the input is recorded and never anything but the same.
-fn stands_still(recording: &Recording) -> bool {
+pub(crate) fn stands_still(recording: &Recording) -> bool {
     let rates = recording.rate_dps.as_deref().is_some_and(|v| v.iter().all(|rate| *rate == 0.0 || rate.is_nan()));
     let table = recording.table_deg.as_deref();
     table.map_or(rates, |v| v.iter().all(|angle| Some(angle) == v.first() || angle.is_nan()))

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Naming, Recording, RunKind};
+use cvg_calibration::recording::{Campaign, Channel, Naming, ReadError, Recording, RunKind};
 use serde_json::{Value, json};
 
 use crate::figure::{BLUE, GREEN, PURPLE, Series, VERMILLION, plot, plot_png};
@@ -27,14 +27,18 @@ pub(crate) fn inspect(
         let recordings = if input::is_campaign(&file) {
             let campaign = Campaign::open_named(&file, naming).map_err(input::explained)?;
             if !as_json {
-                println!("{}: {}, {} runs", file.display(), campaign.device, campaign.runs.len());
+                output::answer(&format!("{}: {}, {} runs\n", file.display(), campaign.device, campaign.runs.len()))?;
                 for w in &campaign.warnings {
-                    println!("  warning: {w}");
+                    output::answer(&format!("  warning: {w}\n"))?;
                 }
             }
             campaign.runs.into_iter().map(|run| (Some(run.kind), run.recording)).collect()
         } else {
-            vec![(None, input::recording(&file, naming)?)]
+            let read = input::read(&file, naming);
+            if let (false, Err(error)) = (as_json, &read) {
+                output::answer(&unnamed(&file, error))?;
+            }
+            vec![(None, read.map_err(input::explained)?)]
         };
         for (kind, recording) in recordings {
             if let Some(path) = plotted.filter(|_| !drawn) {
@@ -44,19 +48,19 @@ pub(crate) fn inspect(
             if as_json {
                 facts.push(as_value(&recording));
             } else {
-                print!("{}", in_words(&recording, kind));
+                output::answer(&in_words(&recording, kind))?;
             }
         }
     }
     if as_json {
-        println!("{}", serde_json::to_string_pretty(&facts).map_err(Failure::input)?);
+        output::answer(&format!("{}\n", serde_json::to_string_pretty(&facts).map_err(Failure::input)?))?;
     }
     Ok(())
 }
 
-/// A channel in numbers.
+/// A column in numbers.
 struct Summary {
-    channel: Channel,
+    name: String,
     missing: usize,
     low: f64,
     mean: f64,
@@ -66,10 +70,36 @@ struct Summary {
 
 fn summaries(recording: &Recording) -> Vec<Summary> {
     let channels = Channel::ALL.into_iter().filter(|c| *c != Channel::Time);
-    channels.filter_map(|c| recording.channel(c).map(|v| summary(c, v))).collect()
+    channels.filter_map(|c| recording.channel(c).map(|v| summary(c.name(), v))).collect()
 }
 
-fn summary(channel: Channel, values: &[f64]) -> Summary {
+/// What the columns of a foreign file hold; nothing where that cannot be told.
+fn unnamed(file: &Path, error: &ReadError) -> String {
+    let Some(columns) = input::foreign_columns(file, error) else { return String::new() };
+    let rows = columns.first().map_or(0, |(_, values)| values.len());
+    let mut s = format!("{}: {rows} rows whose columns have names of their own\n", file.display());
+    table(&mut s, &columns.iter().map(|(name, values)| summary(name, values)).collect::<Vec<_>>());
+    s
+}
+
+/// The columns, a line each.
+fn table(s: &mut String, columns: &[Summary]) {
+    let wide = columns.iter().map(|x| x.name.chars().count()).max().unwrap_or(0).clamp(10, 30);
+    let _ = writeln!(
+        s,
+        "  {:<wide$}{:>14}{:>14}{:>14}{:>9}  over time",
+        "column", "smallest", "mean", "largest", "missing"
+    );
+    for x in columns {
+        let _ = writeln!(
+            s,
+            "  {:<wide$}{:>14.6}{:>14.6}{:>14.6}{:>9}  {}",
+            x.name, x.low, x.mean, x.high, x.missing, x.small
+        );
+    }
+}
+
+fn summary(name: &str, values: &[f64]) -> Summary {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let count = finite().count();
@@ -83,7 +113,7 @@ fn summary(channel: Channel, values: &[f64]) -> Summary {
     };
     let small = values.chunks(values.len().div_ceil(SMALL).max(1)).map(bar).collect();
     Summary {
-        channel,
+        name: name.to_owned(),
         missing: values.len() - count,
         low,
         mean: finite().sum::<f64>() / count.max(1) as f64,
@@ -107,8 +137,12 @@ fn uses(recording: &Recording) -> Vec<String> {
         Ok(()) => format!("serves as {kind}"),
         Err(_) => format!("does not serve as {kind}"),
     };
-    let mut out =
-        vec![say("a rotation", recording.require_rotation()), say("a ring-down", recording.require_ringdown())];
+    let rotation = if recording.require_rotation().is_ok() && input::stands_still(recording) {
+        "does not serve as a rotation: the table does not turn".to_owned()
+    } else {
+        say("a rotation", recording.require_rotation())
+    };
+    let mut out = vec![rotation, say("a ring-down", recording.require_ringdown())];
     if recording.vas_v.is_none() || recording.vqc_v.is_none() {
         out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
     }
@@ -131,18 +165,10 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
         1.0 / interval,
         d.rows_dropped()
     ));
-    line(format!("  {:<10}{:>14}{:>14}{:>14}{:>9}  over time", "column", "smallest", "mean", "largest", "missing"));
-    for x in summaries(recording) {
-        line(format!(
-            "  {:<10}{:>14.6}{:>14.6}{:>14.6}{:>9}  {}",
-            x.channel.name(),
-            x.low,
-            x.mean,
-            x.high,
-            x.missing,
-            x.small
-        ));
-    }
+    table(&mut s, &summaries(recording));
+    let mut line = |text: String| {
+        let _ = writeln!(s, "{text}");
+    };
     for u in uses(recording) {
         line(format!("  {u}"));
     }
@@ -159,16 +185,14 @@ fn as_value(recording: &Recording) -> Value {
     let (duration_s, interval_s, largest_interval_s) = timing(&recording.t_s);
     let columns: Vec<Value> = summaries(recording)
         .iter()
-        .map(|x| {
-            json!({"name": x.channel.name(), "smallest": x.low, "mean": x.mean, "largest": x.high, "missing": x.missing})
-        })
+        .map(|x| json!({"name": x.name, "smallest": x.low, "mean": x.mean, "largest": x.high, "missing": x.missing}))
         .collect();
     json!({
         "file": recording.source.display().to_string(), "rows": recording.len(),
         "rows_dropped": recording.dropped.rows_dropped(), "duration_s": duration_s, "interval_s": interval_s,
         "largest_interval_s": largest_interval_s, "columns": columns,
         "unknown_columns": recording.unknown.iter().map(|u| u.name.as_str()).collect::<Vec<_>>(),
-        "rotation": recording.require_rotation().is_ok(), "ringdown": recording.require_ringdown().is_ok(),
+        "rotation": recording.require_rotation().is_ok() && !input::stands_still(recording), "ringdown": recording.require_ringdown().is_ok(),
         "warnings": recording.warnings,
     })
 }
@@ -177,14 +201,13 @@ fn as_value(recording: &Recording) -> Value {
 fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
     let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high > x.low).collect();
     let stride = recording.len().div_ceil(POINTS).max(1);
-    let names: Vec<String> =
-        shown.iter().map(|x| format!("{} ({:.4} to {:.4})", x.channel.name(), x.low, x.high)).collect();
+    let names: Vec<String> = shown.iter().map(|x| format!("{} ({:.4} to {:.4})", x.name, x.low, x.high)).collect();
     let series: Vec<Series<'_>> = shown
         .iter()
         .zip(&names)
         .zip([BLUE, VERMILLION, GREEN, PURPLE].into_iter().cycle())
         .map(|((x, name), colour)| {
-            let values = recording.channel(x.channel).unwrap_or_default();
+            let values = Channel::of(&x.name).and_then(|c| recording.channel(c)).unwrap_or_default();
             let unit = |v: f64| (v - x.low) / (x.high - x.low);
             let points = recording.t_s.iter().zip(values).step_by(stride).filter(|(_, v)| v.is_finite());
             Series { name, colour, points: points.map(|(t, v)| (*t, unit(*v))).collect(), joined: true }
@@ -196,6 +219,6 @@ fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
     } else {
         output::write(path, plot(x, y, &series)?.as_bytes())?;
     }
-    eprintln!("wrote {}", path.display());
+    output::tell(format_args!("wrote {}", path.display()));
     Ok(())
 }

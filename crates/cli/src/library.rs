@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use cvg_model::effects::{Description, EffectId, Role, Scaling};
 use serde_json::{Value, json};
 
-use crate::Failure;
+use crate::{Failure, output};
 
 /// Prints the library, or one effect of it.
 pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) -> Result<(), Failure> {
@@ -15,14 +15,16 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
     };
     if as_json {
         let all: Vec<Value> = chosen.iter().map(|d| facts(d)).collect();
-        println!("{}", serde_json::to_string_pretty(&all).map_err(Failure::input)?);
+        output::answer(&format!("{}\n", serde_json::to_string_pretty(&all).map_err(Failure::input)?))?;
     } else if as_markdown {
-        print!("{}", page());
+        output::answer(&page())?;
     } else if effect.is_some() {
-        chosen.iter().for_each(|d| print!("{}", in_full(d)));
+        for d in chosen {
+            output::answer(&in_full(d))?;
+        }
     } else {
         for d in chosen {
-            println!("{:<25}{:<11}{}", d.id, stage(d), d.title);
+            output::answer(&format!("{:<25}{:<11}{}\n", d.id, stage(d), d.title))?;
         }
     }
     Ok(())

@@ -62,8 +62,9 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Effects { effect, json, markdown } => library::effects(effect.as_deref(), json, markdown),
         Command::Paper { out } => paper::paper(&out),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Arguments::command(), "cvg", &mut std::io::stdout());
-            Ok(())
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "cvg", &mut script);
+            output::answer(&String::from_utf8_lossy(&script))
         }
         Command::Man { out } => commands::manual(&out),
     }
@@ -73,8 +74,8 @@ fn run(command: Command) -> Result<(), Failure> {
 fn say(text: &str) {
     let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty()) || !std::io::stderr().is_terminal();
     match text.strip_prefix("error:").filter(|_| !plain) {
-        Some(rest) => eprintln!("\u{1b}[1;31merror:\u{1b}[0m{rest}"),
-        None => eprintln!("{text}"),
+        Some(rest) => output::tell(format_args!("\u{1b}[1;31merror:\u{1b}[0m{rest}")),
+        None => output::tell(format_args!("{text}")),
     }
 }
 

@@ -1,11 +1,28 @@
 //! Files are written whole or not at all, and so are files that belong together: to neighbours first, then moved into
 //! place.
 
+use std::fmt;
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::Failure;
+
+/// Prints a result to standard output. A reader that has gone away has read what it wanted.
+pub(crate) fn answer(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::input(format!("standard output: cannot be written: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says something on standard error. Where that is closed, nobody listens.
+pub(crate) fn tell(text: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
 
 /// A folder for results is one, or can become one: asked before the work is done.
 pub(crate) fn check_folder(folder: &Path) -> Result<(), Failure> {

@@ -44,9 +44,9 @@ struct Row {
 pub(crate) fn paper(out: &Path) -> Result<(), Failure> {
     output::check_folder(out)?;
     let campaign = out.join("campaign");
-    eprintln!("simulating the paper's device into {}", campaign.display());
+    output::tell(format_args!("simulating the paper's device into {}", campaign.display()));
     scenario()?.simulate().write(&campaign).map_err(Failure::input)?;
-    eprintln!("identifying it with the paper's model");
+    output::tell(format_args!("identifying it with the paper's model"));
     let opened = Campaign::open(&campaign.join("campaign.toml"))?;
     let identified = identify_with_picture(opened, &Options { discover: false, ..Options::default() })?;
     let figures =
@@ -58,8 +58,8 @@ pub(crate) fn paper(out: &Path) -> Result<(), Failure> {
     output::write(&out.join("table.csv"), csv_table(&rows).as_bytes())?;
     let table = markdown(&rows);
     output::write(&out.join("table.md"), table.as_bytes())?;
-    print!("{table}");
-    eprintln!("wrote {}", out.display());
+    output::answer(&table)?;
+    output::tell(format_args!("wrote {}", out.display()));
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use cvg_model::effects::EffectId;
-use support::cvg_ok;
+use support::{Bench, cvg_ok};
 use tempfile::TempDir;
 
 fn repository() -> PathBuf {
@@ -17,7 +17,7 @@ fn repository() -> PathBuf {
 }
 
 fn page(name: &str) -> String {
-    fs::read_to_string(repository().join(name)).unwrap()
+    fs::read_to_string(repository().join(name)).unwrap().replace("\r\n", "\n")
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn calls() -> Vec<(String, String)> {
     pages.push(repository().join("README.md"));
     let mut found = Vec::new();
     for path in pages {
-        let text = fs::read_to_string(&path).unwrap();
+        let text = fs::read_to_string(&path).unwrap().replace("\r\n", "\n");
         for block in text.split("```sh\n").skip(1) {
             for line in block.split("```").next().unwrap().lines() {
                 let line = line.split("  #").next().unwrap();
@@ -103,5 +103,40 @@ fn the_commands_page_lists_every_command() {
     let commands = help.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
     for command in commands.filter_map(|l| l.split_whitespace().next()).filter(|c| *c != "help") {
         assert!(listed.contains(&format!("`cvg {command}")), "docs/src/cli.md lacks {command}");
+    }
+}
+
+/// Texts between a tag that begins with `tag` and its end.
+fn texts(html: &str, tag: &str) -> Vec<String> {
+    let opening = format!("<{tag} ");
+    let parts = html.split(&opening).skip(1);
+    parts.filter_map(|p| Some(p.split_once('>')?.1.split_once('<')?.0.to_owned())).collect()
+}
+
+#[test]
+fn the_page_on_the_report_explains_each_of_its_sections_and_figures() {
+    let bench = Bench::paper();
+    let (campaign, out) = (bench.campaign(), bench.path("out"));
+    cvg_ok(&[OsStr::new("identify"), campaign.as_os_str(), OsStr::new("--out"), out.as_os_str()]);
+    let html = fs::read_to_string(out.join("report.html")).unwrap();
+    let explained = page("docs/src/report.md");
+    let (sections, figures) = (texts(&html, "h2"), texts(&html, "h3"));
+    assert!(sections.len() >= 6 && figures.len() >= 10, "{sections:?} {figures:?}");
+    for section in sections {
+        assert!(explained.contains(&format!("## {section}\n")), "docs/src/report.md lacks {section}");
+    }
+    for figure in figures {
+        let row = if figure.starts_with("Scaling of ") { "Scaling of each effect".to_owned() } else { figure };
+        assert!(explained.contains(&format!("| {row} |")), "docs/src/report.md lacks {row}");
+    }
+}
+
+#[test]
+fn the_commands_page_lists_every_field_of_the_report() {
+    let report = support::report(&Bench::small().campaign());
+    let listed = page("docs/src/cli.md");
+    let effect = report["effects"][0].as_object().unwrap();
+    for key in report.as_object().unwrap().keys().chain(effect.keys()) {
+        assert!(listed.contains(&format!("| `{key}` |")), "docs/src/cli.md lacks {key}");
     }
 }

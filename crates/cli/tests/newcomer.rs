@@ -46,6 +46,8 @@ fn a_first_look_says_what_the_columns_are_and_how_to_name_them() {
     for command in ["inspect", "identify"] {
         let refused = cvg(&[OsStr::new(command), file.as_os_str()]);
         assert_eq!(refused.status, 2);
+        let table = refused.stdout.lines().find(|l| l.trim_start().starts_with("D1 X "));
+        assert_eq!(table.is_some(), command == "inspect", "{command} shows what the columns hold: {}", refused.stdout);
         for part in ["`D1 X`", "--map 't_s=Time (ms)'", "[columns] of a campaign.toml"] {
             assert!(refused.stderr.contains(part), "{command}: {part}: {}", refused.stderr);
         }

@@ -133,6 +133,9 @@ fn inspect_says_what_is_in_a_file_and_what_is_wrong_with_it() {
     assert_eq!((facts[0]["rotation"].as_bool(), facts[0]["rows_dropped"].as_u64()), (Some(true), Some(1)));
     let campaign = bench.campaign();
     assert!(cvg_ok(&[OsStr::new("inspect"), campaign.as_os_str()]).contains("runs"));
+    let still = bench.path("ringdown-0.csv");
+    let said = cvg_ok(&[OsStr::new("inspect"), still.as_os_str()]);
+    assert!(said.contains("the table does not turn") && said.contains("serves as a ring-down"), "{said}");
 }
 
 #[test]
@@ -227,4 +230,30 @@ fn errors_are_coloured_on_a_terminal_unless_no_colour_is_wanted() {
     assert!(said("").contains("\u{1b}[1;31merror:"), "{:?}", said(""));
     let plain = said("NO_COLOR=1");
     assert!(plain.contains("error:") && !plain.contains('\u{1b}'), "{plain:?}");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_cvg"))
+        .args(["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), said.as_str()), (Some(0), ""));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_standard_output_is_said() {
+    for arguments in [["effects", "--json"], ["completions", "zsh"]] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_cvg")).args(arguments).stdout(full).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.starts_with("error: standard output: cannot be written"), "{said}");
+    }
 }

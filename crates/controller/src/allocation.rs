@@ -95,6 +95,21 @@ impl<T: Float> Allocation<T> {
     ///
     /// # Errors
     /// A limit outside its domain.
+    ///
+    /// ```
+    /// use cvg_controller::{ActuationCompensation, Allocation, OrbitCommands};
+    /// use cvg_model::effects::EffectId;
+    ///
+    /// let uneven = (EffectId::ActuationGainMismatch, [1.02_f32, 0.0, 0.0, 0.0]);
+    /// let drives = Allocation::new(Some(ActuationCompensation::new(&[uneven])?), 10.0)?;
+    /// // an energy command along a pattern at 45°: the stronger channel gets less
+    /// let command = OrbitCommands { v_as: -1.0, v_qc: 0.0, v_qs: 0.0, v_ac: 0.0 };
+    /// let (sin, cos) = core::f32::consts::FRAC_PI_4.sin_cos();
+    /// let even = Allocation::new(None, 10.0_f32)?.step(&command, cos, sin).volts;
+    /// let volts = drives.step(&command, cos, sin).volts;
+    /// assert!(volts.x_s.abs() < even.x_s.abs() && volts.y_s.abs() > even.y_s.abs());
+    /// # Ok::<(), cvg_controller::ConfigError>(())
+    /// ```
     pub fn new(compensation: Option<ActuationCompensation<T>>, limit_v: T) -> Result<Self, ConfigError> {
         Ok(Self { compensation, limit_v: positive(limit_v, "limit_v")? })
     }

@@ -75,6 +75,22 @@ impl<T: Float> PatternAngle<T> {
     ///
     /// # Errors
     /// A `least_v` that is negative or not finite.
+    ///
+    /// ```
+    /// use cvg_estimator::{AngleState, PatternAngle, Period};
+    /// use cvg_model::Orbit;
+    ///
+    /// let tracker = PatternAngle::<f32>::new(Period::Pattern, 1e-3)?;
+    /// let mut state = AngleState::default();
+    /// // three turns of the pattern, 10° at a time
+    /// for i in 0..=108 {
+    ///     let theta = (10.0 * i as f32).to_radians();
+    ///     let reading = tracker.step(&mut state, &Orbit { a: 1.0, q: 0.0, theta, delta: 0.0 }.envelope());
+    ///     let unwrapped = reading.periods as f32 * 180.0 + reading.within_rad.to_degrees();
+    ///     assert!((unwrapped - 10.0 * i as f32).abs() < 1e-2);
+    /// }
+    /// # Ok::<(), cvg_estimator::ConfigError>(())
+    /// ```
     pub fn new(period: Period, least_v: T) -> Result<Self, ConfigError> {
         if least_v >= T::zero() && least_v.is_finite() {
             Ok(Self { period, least_v })

@@ -49,6 +49,22 @@ impl<T: Float> PhaseLock<T> {
     ///
     /// # Errors
     /// A parameter outside its domain, or a bandwidth that the period cannot realise (2ζω_n T ≥ 1).
+    ///
+    /// ```
+    /// use cvg_estimator::{LockState, PhaseLock};
+    /// use cvg_model::Orbit;
+    ///
+    /// let lock = PhaseLock::<f64>::new(30.0, 1.0, 5e-4, 1e3)?;
+    /// let (mut state, mut phase) = (LockState::default(), 0.3);
+    /// // a vibration 5 rad/s beside the reference: the phase is nulled, the detuning found
+    /// for _ in 0..4000 {
+    ///     let vibration = Orbit { a: 1.0, q: 0.0, theta: 0.4, delta: phase }.envelope();
+    ///     let correction = lock.step(&mut state, &vibration.pendulum());
+    ///     phase += (5.0 - correction.rad_s) * 5e-4;
+    /// }
+    /// assert!(phase.abs() < 1e-6 && (state.detuning_rad_s - 5.0).abs() < 1e-4);
+    /// # Ok::<(), cvg_estimator::ConfigError>(())
+    /// ```
     pub fn new(bandwidth_rad_s: T, damping: T, period_s: T, limit_rad_s: T) -> Result<Self, ConfigError> {
         let positive = |v: T, parameter| {
             if v > T::zero() && v.is_finite() {

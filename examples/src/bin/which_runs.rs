@@ -60,7 +60,7 @@ fn stretched(run: &Run, by: f64) -> Run {
     match &mut run {
         Run::Rotation { duration_s, .. } => *duration_s *= by,
         Run::Ringdown { duration_s, energy_off_s, .. } => {
-            *duration_s = *energy_off_s + (*duration_s - *energy_off_s) * by
+            *duration_s = *energy_off_s + (*duration_s - *energy_off_s) * by;
         }
     }
     run

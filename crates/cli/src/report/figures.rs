@@ -5,6 +5,8 @@ use cvg_calibration::{BiasCurve, Identification};
 use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
 
+use crate::clouds::thinned;
+
 /// One figure.
 pub(super) struct Figure {
     pub(super) id: String,
@@ -82,7 +84,6 @@ pub(super) fn run_name(path: &str) -> String {
 fn bias(identified: &Identification) -> Figure {
     let curves = &identified.figures.bias;
     let total: usize = curves.iter().map(|c| c.pattern_deg.len()).sum();
-    let stride = total.div_ceil(BIAS_POINTS).max(1);
     type Pick = fn(&BiasCurve) -> &Vec<f64>;
     let stages: [(&str, &str, Pick); 3] = [
         ("raw", "circle", |c| &c.raw_deg),
@@ -97,7 +98,7 @@ fn bias(identified: &Identification) -> Figure {
                 let run = run_name(&c.name);
                 c.pattern_deg.iter().zip(pick(c)).map(move |(x, y)| (*x, *y, run.clone()))
             });
-            all.step_by(stride)
+            thinned(all, total, BIAS_POINTS)
         };
         if points().next().is_none() {
             continue;

@@ -8,6 +8,8 @@ use crate::commands::significant;
 
 /// A residual within this factor of the noise is the noise.
 const AT_THE_NOISE: f64 = 1.2;
+/// What is unexplained and yet taken out begins its suggestion so.
+const CORRECTED: &str = "corrected as";
 /// Effects that a sentence can name.
 const NAMED: usize = 3;
 
@@ -17,7 +19,11 @@ pub(super) fn degrees(value: f64) -> String {
         return "—".into();
     }
     let size = value.abs();
-    let digits = if size >= 0.1 {
+    let digits = if size >= 10.0 {
+        1
+    } else if size >= 1.0 {
+        2
+    } else if size >= 0.1 {
         3
     } else if size >= 0.01 {
         4
@@ -73,25 +79,31 @@ pub(super) fn finding(r: &Report) -> String {
     let gain = |e: &EffectReport| e.heldout_rms_deg.map_or(0.0, |b| b.before - b.after);
     let mut declared: Vec<&EffectReport> = r.effects.iter().filter(|e| e.origin == Origin::Declared).collect();
     declared.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    let main = declared.first().filter(|e| gain(e) > r.heldout.noise_floor_deg).map(|e| name(e));
-    let found: Vec<String> = r.effects.iter().filter(|e| e.origin == Origin::Discovered).map(name).collect();
+    let main = declared.first().filter(|e| gain(e) > r.heldout.noise_floor_deg);
+    let mut discovered: Vec<&EffectReport> = r.effects.iter().filter(|e| e.origin == Origin::Discovered).collect();
+    discovered.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    let is_least = |main: &EffectReport| discovered.first().is_some_and(|d| gain(d) > gain(main));
+    let found: Vec<String> = discovered.iter().map(|e| name(e)).collect();
     let empirical = r.effects.iter().filter(|e| e.origin == Origin::Empirical).count();
     match (main, found.is_empty()) {
-        (Some(main), true) => sentence += &format!("comes from {main}; nothing undeclared was found"),
+        (Some(main), true) => sentence += &format!("comes from {}; nothing undeclared was found", name(main)),
+        (Some(main), false) if is_least(main) => {
+            sentence += &format!("comes, beyond the declared model, from {}, and from {}", list(&found), name(main));
+        }
         (Some(main), false) => {
-            sentence += &format!("comes from {main} and, beyond the declared model, {}", list(&found));
+            sentence += &format!("comes from {} and, beyond the declared model, {}", name(main), list(&found));
         }
         (None, true) => sentence += "shows no cause of the library above the noise",
         (None, false) => sentence += &format!("comes, beyond the declared model, from {}", list(&found)),
     }
     if empirical > 0 {
-        sentence += &format!("; {empirical} harmonic{} without a known cause", if empirical == 1 { "" } else { "s" });
-        sentence += if empirical == 1 { " is described" } else { " are described" };
+        let (is, of) = if empirical == 1 { ("is", "part") } else { ("are", "parts") };
+        sentence += &format!("; {empirical} {of} of it {is} corrected without a known cause");
     }
     let rest = r.heldout.discovered.rms_deg;
-    if r.unexplained.is_empty() && rest <= AT_THE_NOISE * r.heldout.noise_floor_deg {
+    if rest <= AT_THE_NOISE * r.heldout.noise_floor_deg {
         sentence + "; what is left is the noise of the recording."
-    } else if let Some(u) = r.unexplained.first() {
+    } else if let Some(u) = r.unexplained.iter().find(|u| !u.suggestion.starts_with(CORRECTED)) {
         let n = u.n.map(|n| format!(", n = {n}")).unwrap_or_default();
         sentence + &format!("; {} rms ({}{n}) stay unexplained.", degrees(u.rms_deg), u.class)
     } else {
@@ -128,6 +140,7 @@ mod tests {
 
     #[test]
     fn angles_keep_three_significant_digits() {
+        assert_eq!(degrees(29.63), "29.6°");
         assert_eq!(degrees(0.26789), "0.268°");
         assert_eq!(degrees(0.0011), "0.00110°");
         assert_eq!(degrees(f64::NAN), "—");

@@ -172,7 +172,12 @@ fn files(h: &mut String, r: &Report) {
     let columns = ["file", "kind", "use", "rows", "rate [deg/s]", "run-down τ [s]", "rows dropped, and why"];
     table(h, "Recordings that were read", &columns, |h| {
         for x in &r.runs {
-            let rate = x.rate_dps.map_or("—".into(), |v| format!("{v:.2}"));
+            let rate = match x.rate_dps {
+                // a rotation whose mean is nothing went there and back
+                Some(v) if x.kind == "rotation" && v.abs() < 0.005 => "both ways".to_owned(),
+                Some(v) => format!("{v:.2}"),
+                None => "—".to_owned(),
+            };
             let tau = x.tau_s.map_or("—".into(), |t| format!("{:.4} ± {:.4}", t.value, t.half_width()));
             let dropped = if x.dropped.is_empty() { "none".into() } else { escape(&x.dropped.join("; ")) };
             let rows = x.rows.to_string();
