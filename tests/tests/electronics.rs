@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use cvg_controller::{Allocation, Heading, OrbitCommands, PiState, RateLoop};
 use cvg_estimator::direction::major_axis;
 use cvg_estimator::{AngleState, LockState, PatternAngle, Period, PhaseLock, Status};
-use cvg_model::{Envelope, Pendulum, Real};
+use cvg_model::{Envelope, Orbit, Pendulum, Real};
 use cvg_prover::{Exact, Proof, Refusal};
 use cvg_tests::domain::{envelope_patterns, envelopes, orbits, patterns, wrapped};
 use cvg_tests::proof::{WRONG, holds, rejects};
@@ -167,6 +167,63 @@ for_each_scalar! {
         let volts = rate.step(&mut state, &Pendulum { e, q: e, r, s, l: e }, &heading).volts;
         prop_assert!(volts.to_f64().abs() <= LIMIT && state.integral.is_finite(), "{volts:?} {state:?}");
     }
+}
+
+proptest! {
+    #![proptest_config(cvg_tests::config())]
+
+    /// The first command of a fresh loop is in proportion to the sine of twice the angle that is missing.
+    #[test]
+    fn prop_the_command_that_holds_the_pattern_is_in_proportion_to_its_error(
+        target in -PI..PI, missing in prop::array::uniform2(0.02..1.5_f64), a in 0.1..2.0_f64,
+    ) {
+        let rate = RateLoop::tuned(12.0, 1.0, 1.0, 100.0, 5e-4, 1e6).expect("inside its domain");
+        let heading = Heading::new(target).expect("finite");
+        let [one, other] = missing.map(|by| {
+            let orbit = Orbit { a, q: 0.0, theta: target + by, delta: 0.0 };
+            rate.step(&mut PiState::default(), &orbit.envelope().pendulum(), &heading).volts / (2.0 * by).sin()
+        });
+        prop_assert!(one != 0.0);
+        prop_assert_near!(one / other, 1.0, 1e-9);
+    }
+}
+
+#[test]
+fn a_reading_needs_the_least_amplitude_that_was_set() {
+    let (least, theta) = (0.3_f64, 0.7_f64);
+    for period in [Period::Pattern, Period::FullTurn] {
+        let tracker = PatternAngle::new(period, least).expect("in its domain");
+        for (a, status) in [(0.301, Status::Valid), (0.299, Status::Undetermined)] {
+            let e = Orbit { a, q: 0.0, theta, delta: 0.0 }.envelope();
+            assert_eq!(tracker.step(&mut AngleState::default(), &e).status, status, "{period:?}, {a} V");
+        }
+    }
+}
+
+#[test]
+fn a_phase_is_undetermined_at_rest_and_invalid_where_a_variable_is_no_number() {
+    let status = |e: f64, l: f64| {
+        lock::<f64>().step(&mut LockState::default(), &Pendulum { e, q: 0.0, r: 0.0, s: 0.0, l }).status
+    };
+    assert_eq!(status(0.0, 0.0), Status::Undetermined);
+    for (e, l) in [(f64::NAN, 0.0), (0.0, f64::NAN), (f64::INFINITY, f64::INFINITY)] {
+        assert_eq!(status(e, l), Status::Invalid, "E = {e}, L = {l}");
+    }
+}
+
+#[test]
+fn a_drive_that_overflows_is_no_number_asked_for_too_much() {
+    let allocation = Allocation::new(None, LIMIT).expect("inside its domain");
+    let (half, most, none) = (0.5_f64.sqrt(), f64::MAX, 0.0);
+    // each makes one of the four drives overflow
+    for [v_as, v_qs, v_qc, v_ac] in
+        [[most, most, none, none], [most, -most, none, none], [none, none, most, most], [none, none, -most, most]]
+    {
+        let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, half, half);
+        assert_eq!(drive.status, cvg_controller::Status::Invalid, "{v_as:e} {v_qs:e} {v_qc:e} {v_ac:e}");
+    }
+    let large = OrbitCommands { v_as: 1e6, v_qs: 0.0, v_qc: 0.0, v_ac: 0.0 };
+    assert_eq!(allocation.step(&large, half, half).status, cvg_controller::Status::Limited);
 }
 
 /// Any envelope but a circle, on which the direction is found.
