@@ -55,3 +55,101 @@ pub fn proof_pi_output_is_bounded_f32() {
 pub fn twin_pi_output_is_bounded_f32() {
     output_is_bounded(0.5_f32);
 }
+
+fn state_is_within_its_limit<T: Float + Arbitrary>(share: T) {
+    let (pi, _) = any_controller::<T>();
+    let mut state = PiState { integral: kani::any() };
+    let _ = any_step(&pi, &mut state);
+    kani::cover!(state.integral == pi.integral_limit, "held at its limit");
+    kani::cover!(state.integral < T::zero(), "negative");
+    assert!(state.integral.magnitude() <= share * pi.integral_limit);
+}
+
+//= specs/equation-03.md#recovery
+//# A finite error MUST be answered by the law or by the limit whatever the state was before.
+/// After one step of [`Pi::energy`], [`Pi::quadrature`] or [`Pi::control`] the integral lies within what alone commands the
+/// limit, for any bits of input and of the state before. So it does after every further step.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_state_is_within_its_limit_f32() {
+    state_is_within_its_limit(1.0_f32);
+}
+
+/// Half of that is claimed.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_state_is_within_its_limit_f32() {
+    state_is_within_its_limit(0.5_f32);
+}
+
+fn error_is_answered<T: Float + Arbitrary>(admitted: impl Fn(T) -> bool) {
+    let (pi, limit_v) = any_controller::<T>();
+    let mut state = PiState { integral: kani::any() };
+    // precondition: a finite error
+    let error: T = kani::any_where(|e| admitted(*e));
+    let command = pi.control(&mut state, error);
+    kani::cover!(command.status == Status::Within, "as the law asks");
+    kani::cover!(command.volts == limit_v, "at the limit");
+    assert!(command.status != Status::Invalid);
+    assert!(command.status == Status::Within || command.volts.magnitude() == limit_v);
+}
+
+//= specs/equation-03.md#recovery
+//# A finite error MUST be answered by the law or by the limit whatever the state was before.
+/// A finite error is answered by the law or by the limit in [`Pi::control`], for any bits of the state.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_answers_a_finite_error_f32() {
+    error_is_answered(|e: f32| e.is_finite());
+}
+
+/// Errors that are no numbers are let in.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_answers_a_finite_error_f32() {
+    error_is_answered(|_: f32| true);
+}
+
+fn no_windup<T: Float + Arbitrary>(back: impl Fn(T, T) -> bool) {
+    let (integration_time_s, period_s, limit_v): (T, T, T) = (kani::any(), kani::any(), kani::any());
+    // precondition: a period that is not above the integration time
+    kani::assume(period_s <= integration_time_s);
+    // precondition: a configuration that `new` accepts
+    let Ok(pi) = Pi::new(kani::any(), integration_time_s, period_s, limit_v) else {
+        kani::assume(false);
+        unreachable!()
+    };
+    let before: T = kani::any();
+    // precondition: a state that a step has left
+    kani::assume(before.magnitude() <= pi.integral_limit);
+    let mut state = PiState { integral: before };
+    let error: T = kani::any();
+    let command = pi.control(&mut state, error);
+    kani::cover!(command.volts == limit_v && command.status == Status::Limited && state.integral == before, "held");
+    kani::cover!(command.status == Status::Limited && command.volts == -limit_v, "limited below");
+    if command.status == Status::Limited && command.volts > T::zero() {
+        assert!(back(state.integral, before));
+    }
+    if command.status == Status::Limited && command.volts < T::zero() {
+        assert!(back(-state.integral, -before));
+    }
+}
+
+//= specs/equation-03.md#no-windup
+//# The integral MUST NOT grow in the direction in which the output is at its limit.
+/// Where the output of [`Pi::control`] is limited, the integral does not move in the direction of the output.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_does_not_wind_up_f32() {
+    no_windup(|after: f32, before: f32| after <= before);
+}
+
+/// The integral is claimed to move back.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_does_not_wind_up_f32() {
+    no_windup(|after: f32, before: f32| after < before);
+}
