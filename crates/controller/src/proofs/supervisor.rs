@@ -110,12 +110,14 @@ fn supervisor_is_total<T: Float + Arbitrary>(kept: impl Fn(&Observation<T>) -> b
 /// [`Supervisor::step`] does not panic or overflow for any state, observation and beat; a fault keeps its name and the
 /// drives off; an invalid window and the wish for rest turn them off.
 #[kani::proof]
+#[kani::solver(minisat)]
 pub fn proof_supervisor_is_total_f32() {
     supervisor_is_total(|o: &Observation<f32>| o.valid);
 }
 
 /// The drives are claimed to be off after a clipped sample too.
 #[kani::proof]
+#[kani::solver(minisat)]
 #[kani::should_panic]
 pub fn twin_supervisor_is_total_f32() {
     supervisor_is_total(|o: &Observation<f32>| o.valid && !o.clipped);
