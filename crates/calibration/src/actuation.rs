@@ -3,7 +3,7 @@
 //! With the pattern held at an angle the energy loop is on, then off. Off, the amplitude decays at the damping of that
 //! direction; on, the command replaces just that loss. The two together give the drive's gain in that direction.
 
-use cvg_model::Real;
+pub use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::effects::Moment;
 use nalgebra::{Matrix2, Vector2};
 
@@ -12,26 +12,6 @@ use crate::hypothesis::Hypothesis;
 use crate::recording::{Run, RunKind};
 use crate::statistics::{line, robust_deviation};
 use crate::track::wrapped;
-
-//= specs/equation-11.md#ratio-of-the-gains
-//# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
-//= specs/equation-11.md#independence-of-the-set-amplitude
-//# A common factor on both control outputs MUST leave the ratio as it was.
-//= specs/equation-11.md#independence-of-a-common-gain
-//# A common factor on both actuation gains MUST leave the ratio as it was.
-//= specs/equation-11.md#exchange-of-the-runs
-//# Exchanging the two runs MUST invert the ratio.
-/// **Equation 11**, the ratio of the actuation gains from time constants and energy control outputs:
-///
-/// $$\frac{G_{Ax}}{G_{Ay}} = \frac{\tau_{90}\,v_{as@90}}{\tau_0\,v_{as@0}}$$
-///
-/// `tau_*` in s, `v_as_*` in V, both outputs at the same true amplitude (or each divided by its own). Invariant to the
-/// amplitude set point and to a common scale of both gains. Domain: `tau_0`, `v_as_0` ≠ 0. Source: the paper,
-/// Equation 11.
-#[inline]
-pub fn actuation_gain_ratio<T: Real>(tau_0: T, v_as_0: T, tau_90: T, v_as_90: T) -> T {
-    (tau_90 * v_as_90) / (tau_0 * v_as_0)
-}
 
 /// What one ring-down tells.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,10 +25,10 @@ pub struct OrbitCommands<T> {
 /// The inverse of what the drives do to the commands: a 2×2 matrix from (x, y) to (x, y), the same for both phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationCompensation<T> {
-    xx: T,
-    xy: T,
-    yx: T,
-    yy: T,
+    pub(crate) xx: T,
+    pub(crate) xy: T,
+    pub(crate) yx: T,
+    pub(crate) yy: T,
 }
 
 impl<T: Float> ActuationCompensation<T> {

@@ -57,7 +57,7 @@ pub struct Pi<T> {
     period_s: T,
     limit_v: T,
     /// 2τ·limit/K: the integral that alone commands the limit
-    integral_limit: T,
+    pub(crate) integral_limit: T,
 }
 
 /// The controller's state: plain data, any content is admissible.

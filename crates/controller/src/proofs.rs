@@ -4,4 +4,7 @@
 //! is installed. Each `proof_` has a `twin_` with an error planted in the same body, which has to be refuted. An
 //! assumption is either a "precondition:" of the function or a "budget:" of the solver.
 
+pub mod allocation;
 pub mod pi;
+pub mod rate;
+pub mod supervisor;

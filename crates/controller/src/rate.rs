@@ -18,8 +18,8 @@ use crate::{Command, ConfigError, Status, positive};
 /// A target angle as cosine and sine of twice itself: all that a pattern of period 180° knows of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heading<T> {
-    cos_2: T,
-    sin_2: T,
+    pub(crate) cos_2: T,
+    pub(crate) sin_2: T,
 }
 
 impl<T: Float> Heading<T> {
@@ -48,8 +48,8 @@ impl<T: Float> Heading<T> {
 /// The rate loop's configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateLoop<T> {
-    pi: Pi<T>,
-    limit_v: T,
+    pub(crate) pi: Pi<T>,
+    pub(crate) limit_v: T,
 }
 
 impl<T: Float> RateLoop<T> {

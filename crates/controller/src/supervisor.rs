@@ -154,19 +154,19 @@ pub struct SupervisorSettings {
 /// The supervisor's configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supervisor<T> {
-    set_2: T,
-    heard_2: T,
-    band_rad_s: T,
-    sweep: u32,
-    sweeps: u8,
-    listen: u32,
-    lock: u32,
-    spin_up: u32,
-    coast: u32,
-    endure: u32,
-    rest: u32,
-    retries: u8,
-    forget: u32,
+    pub(crate) set_2: T,
+    pub(crate) heard_2: T,
+    pub(crate) band_rad_s: T,
+    pub(crate) sweep: u32,
+    pub(crate) sweeps: u8,
+    pub(crate) listen: u32,
+    pub(crate) lock: u32,
+    pub(crate) spin_up: u32,
+    pub(crate) coast: u32,
+    pub(crate) endure: u32,
+    pub(crate) rest: u32,
+    pub(crate) retries: u8,
+    pub(crate) forget: u32,
 }
 
 /// The supervisor's state: plain data, any content is admissible.

@@ -9,12 +9,12 @@ use cvg_model::{Envelope, Float};
 /// The sum: plain data, any content is admissible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beat<T> {
-    last: Envelope<T>,
-    along: T,
-    across: T,
-    x2: T,
-    y2: T,
-    windows: u32,
+    pub(crate) last: Envelope<T>,
+    pub(crate) along: T,
+    pub(crate) across: T,
+    pub(crate) x2: T,
+    pub(crate) y2: T,
+    pub(crate) windows: u32,
 }
 
 impl<T: Float> Default for Beat<T> {

@@ -35,6 +35,8 @@ pub mod direction;
 pub mod nco;
 pub mod oscillator;
 pub mod precession;
+#[cfg(any(kani, test, cvg_prove))]
+pub mod proofs;
 
 pub use angle::{AngleState, PatternAngle, Period, Reading};
 pub use beat::Beat;

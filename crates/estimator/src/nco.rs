@@ -14,10 +14,10 @@ use crate::ConfigError;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator<T> {
     /// cosine and sine of the nominal phase step ω₀T
-    centre_cos: T,
-    centre_sin: T,
-    period_s: T,
-    limit_rad_s: T,
+    pub(crate) centre_cos: T,
+    pub(crate) centre_sin: T,
+    pub(crate) period_s: T,
+    pub(crate) limit_rad_s: T,
 }
 
 /// The oscillator's state: plain data, any content is admissible.

@@ -15,10 +15,10 @@ use crate::{ConfigError, Status};
 /// $$s^2 + K s + \frac{K}{2\tau} = 0,\qquad K = 2\zeta\omega_n,\quad \tau = \zeta/\omega_n.$$
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseLock<T> {
-    gain_per_s: T,
+    pub(crate) gain_per_s: T,
     /// K·T/(2τ), 1/s: what one sample of error adds to the integral part
-    integral_gain_per_s: T,
-    limit_rad_s: T,
+    pub(crate) integral_gain_per_s: T,
+    pub(crate) limit_rad_s: T,
 }
 
 /// The loop's state: plain data, any content is admissible.

@@ -12,11 +12,11 @@ use crate::{ConfigError, Direction};
 /// The tracker's configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precession<T> {
-    share: T,
-    jump_sin_2: T,
-    lead_windows: T,
-    window_s: T,
-    least_2: T,
+    pub(crate) share: T,
+    pub(crate) jump_sin_2: T,
+    pub(crate) lead_windows: T,
+    pub(crate) window_s: T,
+    pub(crate) least_2: T,
 }
 
 /// The tracker's state: plain data, any content is admissible.

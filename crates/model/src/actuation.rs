@@ -1,4 +1,4 @@
-//! What misaligned and unequal forces do (Equations 8, 9 and 10).
+//! What misaligned and unequal forces do (Equations 8, 9 and 10), and what tells the gains apart (Equation 11).
 //!
 //! Signs are those of Equation 3: v_as > 0 takes energy out. With F = f_c − i f_s the envelope moves at F/(2iω), so
 //! in the orbit frame, for q ≈ 0: ȧ ∋ −f_as/2ω, θ̇ ∋ −f_qs/(2ωa), q̇ ∋ +f_qc/2ω, δ̇ ∋ −f_ac/(2ωa).
@@ -49,6 +49,26 @@ pub struct AxisForces<T> {
     pub y_c: T,
     /// f_ys
     pub y_s: T,
+}
+
+//= specs/equation-11.md#ratio-of-the-gains
+//# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
+//= specs/equation-11.md#independence-of-the-set-amplitude
+//# A common factor on both control outputs MUST leave the ratio as it was.
+//= specs/equation-11.md#independence-of-a-common-gain
+//# A common factor on both actuation gains MUST leave the ratio as it was.
+//= specs/equation-11.md#exchange-of-the-runs
+//# Exchanging the two runs MUST invert the ratio.
+/// **Equation 11**, the ratio of the actuation gains from time constants and energy control outputs:
+///
+/// $$\frac{G_{Ax}}{G_{Ay}} = \frac{\tau_{90}\,v_{as@90}}{\tau_0\,v_{as@0}}$$
+///
+/// `tau_*` in s, `v_as_*` in V, both outputs at the same true amplitude (or each divided by its own). Invariant to the
+/// amplitude set point and to a common scale of both gains. Domain: `tau_0`, `v_as_0` ≠ 0. Source: the paper,
+/// Equation 11.
+#[inline]
+pub fn actuation_gain_ratio<T: Real>(tau_0: T, v_as_0: T, tau_90: T, v_as_90: T) -> T {
+    (tau_90 * v_as_90) / (tau_0 * v_as_0)
 }
 
 //= specs/equation-08.md#rotation-of-the-commands

@@ -55,3 +55,59 @@ pub fn proof_pi_output_is_bounded_f32() {
 pub fn twin_pi_output_is_bounded_f32() {
     output_is_bounded(0.5_f32);
 }
+
+fn state_is_within_its_limit<T: Float + Arbitrary>(share: T) {
+    let (pi, _) = any_controller::<T>();
+    let mut state = PiState { integral: kani::any() };
+    let _ = any_step(&pi, &mut state);
+    kani::cover!(state.integral == pi.integral_limit, "held at its limit");
+    kani::cover!(state.integral < T::zero(), "negative");
+    assert!(state.integral.magnitude() <= share * pi.integral_limit);
+}
+
+//= specs/equation-03.md#recovery
+//# A finite error MUST be answered by the law or by the limit whatever the state was before.
+/// After one step of [`Pi::energy`], [`Pi::quadrature`] or [`Pi::control`] the integral lies within what alone commands the
+/// limit, for any bits of input and of the state before. So it does after every further step.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_state_is_within_its_limit_f32() {
+    state_is_within_its_limit(1.0_f32);
+}
+
+/// Half of that is claimed.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_state_is_within_its_limit_f32() {
+    state_is_within_its_limit(0.5_f32);
+}
+
+fn error_is_answered<T: Float + Arbitrary>(admitted: impl Fn(T) -> bool) {
+    let (pi, limit_v) = any_controller::<T>();
+    let mut state = PiState { integral: kani::any() };
+    // precondition: a finite error
+    let error: T = kani::any_where(|e| admitted(*e));
+    let command = pi.control(&mut state, error);
+    kani::cover!(command.status == Status::Within, "as the law asks");
+    kani::cover!(command.volts == limit_v, "at the limit");
+    assert!(command.status != Status::Invalid);
+    assert!(command.status == Status::Within || command.volts.magnitude() == limit_v);
+}
+
+//= specs/equation-03.md#recovery
+//# A finite error MUST be answered by the law or by the limit whatever the state was before.
+/// A finite error is answered by the law or by the limit in [`Pi::control`], for any bits of the state.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_answers_a_finite_error_f32() {
+    error_is_answered(|e: f32| e.is_finite());
+}
+
+/// Errors that are no numbers are let in.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_answers_a_finite_error_f32() {
+    error_is_answered(|_: f32| true);
+}

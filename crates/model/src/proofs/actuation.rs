@@ -1,6 +1,6 @@
-//! Equations 8, 9 and 10.
+//! Equations 8 to 11.
 
-use crate::actuation::misaligned_forces;
+use crate::actuation::{actuation_gain_ratio, misaligned_forces};
 use crate::{ActuationGains, ControlOutputs, Float};
 use kani::Arbitrary;
 
@@ -192,4 +192,57 @@ pub fn proof_equal_gains_do_not_leak_f64() {
 #[kani::should_panic]
 pub fn twin_equal_gains_do_not_leak_f64() {
     equal_gains_do_not_leak(1.01_f64);
+}
+
+fn ratio_keeps_its_sign<T: Float + Arbitrary>(turned: T) {
+    // precondition: decay times and outputs of any size that a ring-down has
+    let (tau_0, tau_90): (T, T) = (sized(1e-6, 1e6), sized(1e-6, 1e6));
+    // precondition: outputs other than zero
+    let (v_0, v_90): (T, T) = (sized(1e-6, 1e6), sized(1e-6, 1e6));
+    // precondition: decay times are positive
+    kani::assume(tau_0 > T::zero() && tau_90 > T::zero());
+    let ratio = actuation_gain_ratio(tau_0, v_0, tau_90, turned * v_90);
+    kani::cover!(ratio > T::two(), "X is stronger");
+    kani::cover!(ratio < T::zero(), "one drive is reversed");
+    assert!(ratio.is_finite() && ratio != T::zero());
+    assert!((ratio > T::zero()) == ((v_0 > T::zero()) == (v_90 > T::zero())));
+}
+
+//= specs/equation-11.md#ratio-of-the-gains
+//# The ratio MUST be the gain of X over the gain of Y where each control output balances the damping along its axis.
+/// Equation 11 ([`actuation_gain_ratio`]) is a finite number other than zero, positive where both outputs have one sign.
+#[kani::proof]
+pub fn proof_ratio_keeps_its_sign_f32() {
+    ratio_keeps_its_sign(1.0_f32);
+}
+
+/// One output is taken with the other sign.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_ratio_keeps_its_sign_f32() {
+    ratio_keeps_its_sign(-1.0_f32);
+}
+
+fn common_factor_drops_out<T: Float + Arbitrary>(factors: (T, T)) {
+    let (tau_0, v_0, tau_90, v_90): (T, T, T, T) = (kani::any(), kani::any(), kani::any(), kani::any());
+    let a = actuation_gain_ratio(tau_0, v_0, tau_90, v_90);
+    let b = actuation_gain_ratio(tau_0, factors.0 * v_0, tau_90, factors.1 * v_90);
+    kani::cover!(a > T::two() && a.is_finite(), "X is stronger");
+    kani::cover!(is_nan(a), "no number");
+    assert!(a == b || (is_nan(a) && is_nan(b)));
+}
+
+//= specs/equation-11.md#independence-of-the-set-amplitude
+//# A common factor on both control outputs MUST leave the ratio as it was.
+/// Reversing both outputs leaves Equation 11 ([`actuation_gain_ratio`]) as it was, for any bits of times and outputs.
+#[kani::proof]
+pub fn proof_common_factor_drops_out_f32() {
+    common_factor_drops_out((-1.0_f32, -1.0));
+}
+
+/// One output is reversed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_common_factor_drops_out_f32() {
+    common_factor_drops_out((-1.0_f32, 1.0));
 }

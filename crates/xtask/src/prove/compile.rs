@@ -1,5 +1,6 @@
-//! Harnesses → one wasm module → C.
+//! Harnesses → one wasm module for each crate → C.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,19 +10,17 @@ use super::Harness;
 use super::root::Root;
 
 /// The crates that have harnesses; the guards are files of this one.
-pub(crate) const CRATES: [&str; 3] = ["model", "estimator", "controller"];
+pub(crate) const CRATES: [&str; 3] = ["estimator", "controller", "model"];
 
-/// The folder in which the C is, ready for CBMC.
-pub(crate) fn compile(repository: &Path, root: &Root, harnesses: &[Harness]) -> Result<PathBuf, String> {
+/// The folders in which the C is, ready for CBMC, by the crate whose harnesses it holds.
+pub(crate) fn compile(
+    repository: &Path,
+    root: &Root,
+    harnesses: &[Harness],
+) -> Result<BTreeMap<String, PathBuf>, String> {
     let work = repository.join("target/prove");
-    let io = |e: std::io::Error| e.to_string();
     let shim = work.join("shim");
-    let crate_folder = work.join("harness");
-    let c = work.join("c");
-    for folder in [&shim, &crate_folder.join("src"), &c] {
-        fs::create_dir_all(folder).map_err(io)?;
-    }
-
+    fs::create_dir_all(&shim).map_err(|e| e.to_string())?;
     // the stand-in for Kani is handed to every crate, without being a dependency of any
     let sources = repository.join("crates/kani-shim");
     let rustc = || {
@@ -37,14 +36,33 @@ pub(crate) fn compile(repository: &Path, root: &Root, harnesses: &[Harness]) -> 
         .arg(format!("--extern=cvg_kani_macros={}", shim.join("libcvg_kani_macros.so").display()))
         .arg(sources.join("src/lib.rs")))?;
 
-    write_crate(repository, &crate_folder, harnesses)?;
-    let linker = root.tool("wasm-ld");
+    // of one module for all, every harness would carry the data of all
+    let mut groups: BTreeMap<String, Vec<&Harness>> = BTreeMap::new();
+    for h in harnesses {
+        groups.entry(h.package()).or_default().push(h);
+    }
+    let mut folders = BTreeMap::new();
+    for (package, members) in groups {
+        let folder = module(repository, root, &work, &package, &members)?;
+        folders.insert(package, folder);
+    }
+    Ok(folders)
+}
+
+/// The C of one crate's harnesses.
+fn module(repository: &Path, root: &Root, work: &Path, package: &str, members: &[&Harness]) -> Result<PathBuf, String> {
+    let io = |e: std::io::Error| e.to_string();
+    let (shim, crate_folder, c) = (work.join("shim"), work.join(package).join("harness"), work.join(package).join("c"));
+    for folder in [&crate_folder.join("src"), &c] {
+        fs::create_dir_all(folder).map_err(io)?;
+    }
+    write_crate(repository, &crate_folder, package, members)?;
     let flags = [
         "--cfg=cvg_prove".to_owned(),
         format!("--extern=kani={}", shim.join("libkani.rlib").display()),
         format!("-Ldependency={}", shim.display()),
-        format!("-Clinker={}", linker.display()),
-        "-Clink-arg=-zstack-size=4096".to_owned(),
+        format!("-Clinker={}", root.tool("wasm-ld").display()),
+        format!("-Clink-arg=-zstack-size={STACK}"),
         // bulk copies and saturating conversions as plain code
         "-Ctarget-cpu=mvp".to_owned(),
     ];
@@ -69,22 +87,22 @@ pub(crate) fn compile(repository: &Path, root: &Root, harnesses: &[Harness]) -> 
 }
 
 /// The crate that exports every harness by its name.
-fn write_crate(repository: &Path, folder: &Path, harnesses: &[Harness]) -> Result<(), String> {
+fn write_crate(repository: &Path, folder: &Path, package: &str, harnesses: &[&Harness]) -> Result<(), String> {
     let io = |e: std::io::Error| e.to_string();
     let mut manifest = "[package]\nname = \"harness\"\nversion = \"0.0.0\"\nedition = \"2024\"\n\n[lib]\n\
         crate-type = [\"cdylib\"]\n\n[profile.release]\npanic = \"abort\"\nopt-level = 3\nlto = \"fat\"\n\
         codegen-units = 1\noverflow-checks = true\n\n[workspace]\n\n[dependencies]\n"
         .to_owned();
-    for name in CRATES {
+    let mut source = "#![no_std]\n#[panic_handler]\n\
+         fn panic(_: &core::panic::PanicInfo) -> ! { core::arch::wasm32::unreachable() }\n"
+        .to_owned();
+    if let Some(name) = package.strip_prefix("cvg-") {
         let path = repository.join("crates").join(name);
-        let _ = writeln!(manifest, "cvg-{name} = {{ path = {:?} }}", path.display().to_string());
+        let _ = writeln!(manifest, "{package} = {{ path = {:?} }}", path.display().to_string());
+    } else {
+        let guards = repository.join("crates/xtask/src/prove/guards.rs");
+        let _ = writeln!(source, "#[path = {:?}]\nmod guards;", guards.display().to_string());
     }
-    let guards = repository.join("crates/xtask/src/prove/guards.rs");
-    let mut source = format!(
-        "#![no_std]\n#[panic_handler]\nfn panic(_: &core::panic::PanicInfo) -> ! {{ core::arch::wasm32::unreachable() }}\n\
-         #[path = {:?}]\nmod guards;\n",
-        guards.display().to_string()
-    );
     for h in harnesses {
         let _ = writeln!(
             source,
@@ -100,9 +118,13 @@ fn write_crate(repository: &Path, folder: &Path, harnesses: &[Harness]) -> Resul
     Ok(())
 }
 
+/// Bytes of stack; the linker puts the data after it.
+const STACK: usize = 4096;
+
 /// The memory with the data segments that `module`, wasm2c's output, loads when it starts.
 fn data(module: &str) -> Result<String, String> {
     let mut initial = String::new();
+    let mut end = STACK;
     // the body of wasm2c's memory_init, the instruction for bulk data, which the target does not have
     let bulk = "(*dest), dest_addr, src + src_addr, n);";
     let loads = module.lines().filter_map(|line| line.trim().strip_prefix("LOAD_DATA(")).filter(|load| *load != bulk);
@@ -120,9 +142,16 @@ fn data(module: &str) -> Result<String, String> {
         if length.parse() != Ok(count) {
             return Err(format!("data segment {segment}: {count} bytes, {length} are loaded"));
         }
+        let first: usize = offset
+            .trim_end_matches('u')
+            .parse()
+            .map_err(|_| format!("data segment {segment}: {offset} is no offset"))?;
+        end = end.max(first + count);
         let _ = writeln!(initial, "[{offset}] = {bytes},");
     }
-    Ok(format!("static uint8_t memory[MEMORY] = {{{initial}}};\n"))
+    // no more than is used: what lies beyond is out of bounds
+    let memory = end.next_multiple_of(1024) + 1024;
+    Ok(format!("#define MEMORY {memory}\nstatic uint8_t memory[MEMORY] = {{{initial}}};\n"))
 }
 
 fn run(command: &mut Command) -> Result<(), String> {

@@ -54,6 +54,31 @@ pub fn twin_guard_floats_keep_their_bits_in_memory() {
     floats_keep_their_bits_in_memory(1);
 }
 
+fn bytes_keep_their_value(added: u8) {
+    let i: usize = kani::any_where(|i| *i < 4);
+    let byte: u8 = kani::any();
+    let mut bytes = [7_u8; 4];
+    black_box(&mut bytes)[i] = byte;
+    kani::cover!(byte == 200 && i == 3, "a large byte at the end");
+    let half: u16 = kani::any();
+    let mut halves = [9_u16; 4];
+    black_box(&mut halves)[i] = half;
+    assert!(black_box(&bytes)[i] == byte.wrapping_add(added));
+    assert!(black_box(&bytes)[3 - i] == 7 && black_box(&halves)[i] == half && black_box(&halves)[3 - i] == 9);
+}
+
+/// Bytes and half words are stored where and as they were, and their neighbours stay.
+#[kani::proof]
+pub fn proof_guard_bytes_keep_their_value() {
+    bytes_keep_their_value(0);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_bytes_keep_their_value() {
+    bytes_keep_their_value(1);
+}
+
 fn copies_are_whole(last: usize) {
     let mut from = [0_u64; 16];
     let value = kani::any();

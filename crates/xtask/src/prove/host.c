@@ -35,6 +35,8 @@ static void store_f64(uint8_t *d, const double *s) { uint64_t v; bits_of_f64(&v,
 static void store_u64(uint8_t *d, const uint64_t *s) { store8(d, *s); }
 static void store_u32(uint8_t *d, const uint32_t *s) { store4(d, *s); }
 static void store_u16(uint8_t *d, const uint16_t *s) { d[0] = *s; d[1] = *s >> 8; }
+/* One byte; data segments, which come here too, are in data.c. CBMC's _Generic does not tell const apart. */
+static void copy_u8(uint8_t *d, const uint8_t *s, uint64_t n) { if (n == 1) *d = *s; }
 static void no_such_copy(void) { __CPROVER_assert(0, "a copy between types that host.c does not know"); }
 #undef wasm_rt_memcpy
 #define wasm_rt_memcpy(d, s, n) \
@@ -48,7 +50,7 @@ static void no_such_copy(void) { __CPROVER_assert(0, "a copy between types that 
     int16_t *: _Generic((s), uint8_t *: load_s16((void *)(d), (void *)(s)), default: no_such_copy()), \
     int8_t *: _Generic((s), uint8_t *: load_s8((void *)(d), (void *)(s)), default: no_such_copy()), \
     uint8_t *: _Generic((s), \
-      const uint8_t *: (void)0 /* load_data: see below */, \
+      uint8_t *: copy_u8((void *)(d), (const void *)(s), (n)), const uint8_t *: copy_u8((void *)(d), (const void *)(s), (n)), \
       uint16_t *: store_u16((void *)(d), (void *)(s)), uint32_t *: store_u32((void *)(d), (void *)(s)), \
       uint64_t *: store_u64((void *)(d), (void *)(s)), float *: store_f32((void *)(d), (void *)(s)), \
       double *: store_f64((void *)(d), (void *)(s)), default: no_such_copy()), \
@@ -59,10 +61,9 @@ static void no_such_copy(void) { __CPROVER_assert(0, "a copy between types that 
 WASM_RT_THREAD_LOCAL uint32_t wasm_rt_call_stack_depth;
 bool wasm_rt_is_initialized(void) { return true; }
 
-/* The linker puts the stack first, then data. What lies beyond this array is out of bounds: an access there, or a data
- * segment that does not fit, is reported. data.c gives the memory its data segments from the start, which spares CBMC a
- * loop over every byte; guards.rs asks whether they are there. */
-#define MEMORY 8192
+/* The linker puts the stack first, then data. data.c says how large the memory is and gives it its data segments from the
+ * start, which spares CBMC a loop over every byte; guards.rs asks whether they are there. What lies beyond this array is
+ * out of bounds: an access there, or a data segment that does not fit, is reported. */
 #include "data.c"
 void wasm_rt_allocate_memory(wasm_rt_memory_t *m, uint64_t pages, uint64_t most, bool is64, uint32_t page_size) {
   m->data = memory; m->data_end = memory + MEMORY; m->page_size = page_size; m->pages = pages; m->max_pages = most;

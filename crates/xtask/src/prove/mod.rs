@@ -9,7 +9,7 @@ mod root;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -20,7 +20,7 @@ use crate::source::{self, Function};
 use engine::{Answer, Query, Verdict};
 
 /// Seconds that one harness may take.
-const TIMEOUT_S: u64 = 240;
+const TIMEOUT_S: u64 = 400;
 /// The twin of this guard cuts its loop short, which is what has to be seen.
 const CUT_SHORT: &str = "twin_guard_loops_are_counted";
 
@@ -39,6 +39,19 @@ impl Harness {
     /// The name without `proof_` or `twin_`.
     fn claim(&self) -> &str {
         self.function.name.split_once('_').map_or("", |(_, claim)| claim)
+    }
+
+    /// `cvg_controller::proofs::pi::` and the claim: what a part of the harnesses is chosen by.
+    fn address(&self) -> String {
+        self.path.replace(&self.function.name, self.claim())
+    }
+
+    /// `cvg-controller`; the guards are this crate's
+    pub(crate) fn package(&self) -> String {
+        if self.is_guard() {
+            return "xtask".to_owned();
+        }
+        self.path.split("::").next().unwrap_or_default().replace('_', "-")
     }
 
     fn is_guard(&self) -> bool {
@@ -204,23 +217,23 @@ fn paired(harnesses: &[Harness]) -> Result<(), String> {
 }
 
 /// Where the results of the last run are.
-pub(crate) fn results_file(repository: &Path) -> std::path::PathBuf {
+pub(crate) fn results_file(repository: &Path) -> PathBuf {
     repository.join("target/prove/results.json")
 }
 
-/// Proves all harnesses; or tries those whose name contains `only`, without the guards and without leaving a result.
+/// Proves all harnesses; or tries those whose path contains `only`, without the guards and without leaving a result.
 pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     let started = Instant::now();
     let repository = crate::repository();
     let all = harnesses(&repository)?;
     let _ = fs::remove_file(results_file(&repository));
     let root = root::Root::ready()?;
-    let folder = compile::compile(&repository, &root, &all)?;
+    let folders = compile::compile(&repository, &root, &all)?;
     println!("compiled {} harnesses in {:.0} s", all.len(), started.elapsed().as_secs_f64());
 
     let asked: Vec<Job<'_>> =
-        all.iter().filter(|h| only.is_none_or(|text| h.claim().contains(text))).flat_map(Job::of).collect();
-    let answers = ask_all(&root, &folder, &asked);
+        all.iter().filter(|h| only.is_none_or(|text| h.address().contains(text))).flat_map(Job::of).collect();
+    let answers = ask_all(&root, &folders, &asked);
     let mut proofs = Vec::new();
     for job in asked.iter().filter(|job| job.harness.function.name.starts_with("proof_")) {
         let name = job.harness.function.name.as_str();
@@ -251,7 +264,11 @@ pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     Ok(sound && !results.proofs.is_empty())
 }
 
-fn ask_all<'a>(root: &root::Root, folder: &Path, asked: &[Job<'a>]) -> BTreeMap<(&'a str, &'a str), Answer> {
+fn ask_all<'a>(
+    root: &root::Root,
+    folders: &BTreeMap<String, PathBuf>,
+    asked: &[Job<'a>],
+) -> BTreeMap<(&'a str, &'a str), Answer> {
     let next = AtomicUsize::new(0);
     let answers = Mutex::new(BTreeMap::new());
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -267,8 +284,10 @@ fn ask_all<'a>(root: &root::Root, folder: &Path, asked: &[Job<'a>]) -> BTreeMap<
                         solver: job.solver,
                         timeout: Duration::from_secs(TIMEOUT_S),
                     };
+                    let Some(folder) = folders.get(&h.package()) else { continue };
                     let answer = engine::ask(root, folder, &query);
-                    println!("{:>7.1} s  {} ({})", answer.seconds, h.function.name, job.solver);
+                    let verdict = answer.verdict(&query.covers);
+                    println!("{:>7.1} s  {} ({}): {verdict:?}", answer.seconds, h.function.name, job.solver);
                     if let Ok(mut answers) = answers.lock() {
                         answers.insert(job.key(), answer);
                     }
@@ -293,11 +312,10 @@ fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> Pro
         details.push(format!("twin: {twin_verdict:?}"));
     }
     let f = &proof.function;
-    let package = proof.path.split("::").next().unwrap_or_default().replace('_', "-");
     let scalar = ["f32", "f64"].into_iter().find(|scalar| f.name.ends_with(scalar)).unwrap_or_default();
     ProofResult {
         name: f.name.clone(),
-        package: if proof.is_guard() { "xtask".to_owned() } else { package },
+        package: proof.package(),
         place: format!("{}:{}", f.file.display(), f.line),
         claim: f.doc.clone(),
         functions: source::subjects(&f.doc),

@@ -1,0 +1,59 @@
+//! The demodulator's window.
+
+use cvg_model::Float;
+use kani::Arbitrary;
+
+use crate::{Demodulator, Phasor, Window};
+
+/// A demodulator for any number of samples, for converters of ±2.5 V, and its range.
+fn any_demodulator<T: Float>() -> (Demodulator<T>, T) {
+    // precondition: a configuration that `new` accepts
+    match Demodulator::new(kani::any(), 2.5) {
+        Ok(demodulator) => (demodulator, T::ratio(5, 2)),
+        Err(_) => {
+            kani::assume(false);
+            unreachable!()
+        }
+    }
+}
+
+fn any_phasor<T: Float + Arbitrary>() -> Phasor<T> {
+    Phasor { cos: kani::any(), sin: kani::any(), step_cos: kani::any(), step_sin: kani::any() }
+}
+
+fn samples_are_admitted_within_the_range<T: Float + Arbitrary>(share: T) {
+    let (demodulator, range) = any_demodulator::<T>();
+    let count = kani::any();
+    // precondition: a window that is not full
+    kani::assume(count < demodulator.samples());
+    let start = any_phasor::<T>();
+    let mut window = Window { count, invalid: kani::any(), clipped: kani::any(), ..Window::begin(&start) };
+    let before = window;
+    let (x, y): (T, T) = (kani::any(), kani::any());
+    let full = demodulator.accumulate(&mut window, x, y, &start);
+    kani::cover!(full, "a full window");
+    kani::cover!(!full && window.x == range, "at the end of the range");
+    kani::cover!(window.invalid > before.invalid && window.clipped > before.clipped, "no number, and clipped");
+    assert!(window.x.magnitude() <= share * range && window.y.magnitude() <= share * range);
+    assert!(window.count == before.count + 1 && full == (window.count >= demodulator.samples()));
+    assert!(window.invalid >= before.invalid && window.clipped >= before.clipped);
+    if !x.is_finite() {
+        assert!(window.invalid > 0 && window.x == T::zero());
+    }
+}
+
+//= specs/dsp.md#bounded-commands
+//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+/// A sample of any bits is taken by [`Demodulator::accumulate`] as a number within the converter's range, what is none is
+/// counted, the counters do not overflow, and a window is full when it has its samples.
+#[kani::proof]
+pub fn proof_samples_are_admitted_within_the_range_f32() {
+    samples_are_admitted_within_the_range(1.0_f32);
+}
+
+/// Half the range is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_samples_are_admitted_within_the_range_f32() {
+    samples_are_admitted_within_the_range(0.5_f32);
+}

@@ -1,0 +1,97 @@
+//! The tracker of the pattern's motion.
+
+use cvg_model::{Float, Pendulum};
+use kani::Arbitrary;
+
+use super::any_pendulum;
+use crate::{Direction, Movement, Precession, PrecessionState, Status};
+
+/// Any tracker that could be built.
+fn any_precession<T: Float + Arbitrary>() -> Precession<T> {
+    // precondition: shares of one, jumps below 45°, leads below ten windows
+    let share = |most: T| kani::any_where(|v: &T| *v >= T::zero() && *v <= most);
+    // precondition: positive times and amplitudes
+    let positive = || kani::any_where(|v: &T| *v > T::zero() && v.is_finite());
+    Precession {
+        share: share(T::one()),
+        jump_sin_2: share(T::one()),
+        lead_windows: share(T::ratio(10, 1)),
+        window_s: positive(),
+        least_2: positive(),
+    }
+}
+
+fn half_turns_are_counted_singly<T: Float + Arbitrary>(most: i64) {
+    let precession = any_precession::<T>();
+    let before = PrecessionState {
+        cos_2: kani::any(),
+        sin_2: kani::any(),
+        sin_2_per_window: kani::any(),
+        half_turns: kani::any(),
+    };
+    let mut state = before;
+    let p: Pendulum<T> = any_pendulum();
+    let moved = precession.step(&mut state, &p);
+    let passed = i64::from(state.half_turns) - i64::from(before.half_turns);
+    kani::cover!(moved == Movement::Steady && passed == 1, "a half turn");
+    kani::cover!(moved == Movement::Jumped, "a jump");
+    kani::cover!(moved == Movement::Unknown, "nothing known");
+    assert!(passed >= -most && passed <= most);
+    if moved == Movement::Unknown {
+        assert!(passed == 0 && state.sin_2_per_window == T::zero());
+    }
+    if moved == Movement::Steady {
+        assert!(state.sin_2_per_window.magnitude() <= T::two());
+    }
+}
+
+//= specs/dsp.md#unwrapping
+//# The unwrapped angle MUST follow a turning pattern through any number of half turns without a jump.
+/// [`Precession::step`] counts at most one half turn a window, none where it knows no direction, and does not overflow; the
+/// low-passed motion stays bounded, for any bits of pendulum variables and state.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_half_turns_are_counted_singly_f32() {
+    half_turns_are_counted_singly::<f32>(1);
+}
+
+/// None at all is claimed.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_half_turns_are_counted_singly_f32() {
+    half_turns_are_counted_singly::<f32>(0);
+}
+
+fn direction_ahead_is_bounded<T: Float + Arbitrary>(longest: T) {
+    let precession = any_precession::<T>();
+    let state = PrecessionState {
+        cos_2: kani::any(),
+        sin_2: kani::any(),
+        sin_2_per_window: kani::any(),
+        half_turns: kani::any(),
+    };
+    // precondition: a direction as `major_axis` gives it
+    let below_two = || kani::any_where(|v: &T| v.magnitude() <= T::two());
+    let ahead = precession.ahead(&state, &Direction { cos: below_two(), sin: below_two(), status: Status::Valid });
+    let (_, within) = state.angle();
+    kani::cover!(ahead.cos > T::one(), "turned ahead");
+    assert!(ahead.cos.magnitude() <= longest && ahead.sin.magnitude() <= longest);
+    assert!(within.magnitude() <= T::half() * T::PI);
+}
+
+//= specs/dsp.md#bounded-commands
+//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+/// The direction of [`Precession::ahead`] stays below 64 and the angle of [`PrecessionState::angle`] within 90°, for any bits
+/// of the state.
+#[kani::proof]
+pub fn proof_direction_ahead_is_bounded_f32() {
+    direction_ahead_is_bounded(64.0_f32);
+}
+
+/// Less than two is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_direction_ahead_is_bounded_f32() {
+    direction_ahead_is_bounded(1.9_f32);
+}
