@@ -114,9 +114,9 @@ fn c_loop(s: &Settings<'_>) -> (Config, State) {
     let delay = s.drive_delay_s + 0.5 * period;
     let phase = TAU * s.phase.bandwidth_hz;
     let config = Config {
-        free: plant.0,
-        before: plant.1,
-        after: plant.2,
+        free: plant.0.into(),
+        before: plant.1.into(),
+        after: plant.2.into(),
         gain: d.readout_gain,
         inverse_gap_2: 1.0 / (d.gap * d.gap),
         late: [1.0, 0.0],

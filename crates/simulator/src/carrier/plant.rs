@@ -133,10 +133,10 @@ impl CarrierPlant {
         [cos * x + sin * y, cos * y - sin * x, cos * k_x + sin * k_y, cos * k_y - sin * k_x]
     }
 
-    /// The matrices of a sample at the rate that is set, by columns: on the state (x, y, p_x/ω, p_y/ω), on the voltages
-    /// before the outputs change, and after.
-    pub fn matrices(&self) -> ([[f64; 4]; 4], [[f64; 4]; 2], [[f64; 4]; 2]) {
-        (self.at_rate.free, self.at_rate.before, self.at_rate.after)
+    /// The matrices of a sample at the rate that is set: on the state (x, y, p_x/ω, p_y/ω), on the voltages before the
+    /// outputs change, and after.
+    pub fn matrices(&self) -> (Matrix4<f64>, Matrix4x2<f64>, Matrix4x2<f64>) {
+        self.at_rate.matrices()
     }
 
     /// Displacements of x and y.
