@@ -3,6 +3,7 @@
 // Usage: node report.mjs REPORT.html SCREENSHOT_FOLDER
 import assert from "node:assert/strict";
 import { existsSync, mkdirSync, statSync } from "node:fs";
+import { cpus, loadavg } from "node:os";
 import { resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import axe from "axe-core";
@@ -24,6 +25,8 @@ const browser = await chromium.launch({
 });
 const complaints = [];
 const openings_ms = [];
+// the same by the processor time of the page's main thread, which other work on the machine does not lengthen
+const worked_ms = [];
 
 async function open(width, colorScheme) {
   const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme });
@@ -33,11 +36,15 @@ async function open(width, colorScheme) {
   page.on("request", (r) => {
     if (!/^(file|data|blob):/.test(r.url())) complaints.push(`fetches ${r.url()}`);
   });
+  const session = await context.newCDPSession(page);
+  await session.send("Performance.enable", { timeDomain: "threadTicks" });
   const started = performance.now();
   await page.goto(pathToFileURL(report).href, { waitUntil: "load" });
   // open is: the first figure can be read
   await page.waitForSelector("#plot-bias[data-drawn]", { timeout: 30000 });
   openings_ms.push(performance.now() - started);
+  const { metrics } = await session.send("Performance.getMetrics");
+  worked_ms.push(1000 * metrics.find((m) => m.name === "TaskDuration").value);
   await page.waitForSelector("html[data-ready]", { timeout: 60000 });
   return { context, page };
 }
@@ -70,8 +77,13 @@ try {
   const { context, page } = await open(1440, "light");
   // what else runs on the machine makes it slower, never faster
   const opened_ms = Math.min(...openings_ms);
-  console.log(`opens in ${opened_ms.toFixed(0)} ms (best of ${openings_ms.length}), ${statSync(report).size} bytes`);
-  assert.ok(opened_ms < SLOWEST_OPENING_MS, `${opened_ms.toFixed(0)} ms to open`);
+  const busy = loadavg()[0] > cpus().length;
+  const work_ms = Math.min(...worked_ms);
+  console.log(
+    `opens in ${opened_ms.toFixed(0)} ms (best of ${openings_ms.length}), ${work_ms.toFixed(0)} ms of work, ` +
+      `${statSync(report).size} bytes${busy ? "; the machine is busy, the work counts" : ""}`,
+  );
+  assert.ok(work_ms > 0 && (busy ? work_ms : opened_ms) < SLOWEST_OPENING_MS, `${opened_ms} ms to open, ${work_ms} ms of work`);
   const shown = () => page.$$eval("#plot-bias .scatterlayer .trace", (all) => all.length);
   const all = await shown();
   const range = () => page.$eval("#plot-bias", (p) => p._fullLayout.yaxis.range[1] - p._fullLayout.yaxis.range[0]);

@@ -146,6 +146,18 @@ fn left(h: &mut String, r: &Report) {
             }
         });
     }
+    if !r.channels.is_empty() {
+        let columns = ["channel", "stage", "rms", "unit", "memory", "line in time [Hz]", "slow change, rms"];
+        table(h, "Channels of the fitted runs", &columns, |h| {
+            for c in &r.channels {
+                let line = c.line.map_or("—".to_owned(), |l| format!("{:.4}", l.frequency_hz));
+                let drift = c.drift_rms.map_or("—".to_owned(), |v| format!("{v:.2e}"));
+                let memory = if c.white { "none" } else { "some" };
+                let rms = format!("{:.3e}", c.rms);
+                row(h, &[&escape(&c.channel), &escape(&c.stage), &rms, &escape(&c.unit), memory, &line, &drift]);
+            }
+        });
+    }
     let columns = ["of", "n", "amplitude [deg]", "95 % of a component [deg]", "phase [deg]"];
     table(h, "Harmonics of the residual", &columns, |h| {
         for x in &r.residual.harmonics {
