@@ -7,7 +7,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use cvg_calibration::Identification;
+use cvg_calibration::{Identification, Origin};
 use cvg_tests::bench::{all, folder, identify_folder};
 
 /// Rings of the set.
@@ -49,5 +49,29 @@ fn measured_rings_are_centred_before_there_is_an_angle() {
         assert!(r.heldout.raw.is_none(), "{name}: the raw angle does not turn");
         assert!(r.warnings.iter().any(|w| w.contains("raw")), "{name}: no warning says so: {:?}", r.warnings);
         assert!(ids.contains(&"detection-offset"), "{name}: {ids:?}");
+    }
+}
+
+/// Cycles of the field per turn of the ring: what the sensors see repeats with each, what drives the ring need not.
+const CYCLES_PER_TURN: f64 = 25.0;
+/// How far a line may be from a whole order of the ring's turn.
+const ORDER: f64 = 0.03;
+
+#[test]
+fn measured_rings_show_what_turns_them_on_held_out_turns_too() {
+    for (name, identified) in rings().unwrap_or_default() {
+        let r = &identified.report;
+        let lines = r.effects.iter().filter(|e| e.id == "time-periodic");
+        let turn_hz = r.runs[0].rate_dps.unwrap() * r.angular_gain.value / 360.0 / CYCLES_PER_TURN;
+        let orders: Vec<f64> = lines.clone().map(|e| e.parameters[0].value / turn_hz).collect();
+        let [before, after] = [r.heldout.declared.rms_deg, r.heldout.discovered.rms_deg];
+        println!("{name}: orders {orders:.3?} of the ring's turn; held-out {before:.2}° to {after:.2}°");
+        // one speed: a line may be one of the ring's turn, and is not given a cause
+        assert!(lines.clone().all(|e| e.origin == Origin::Empirical), "{name}");
+        assert!(!orders.is_empty() && after < 0.9 * before, "{name}: {before}° to {after}°");
+        for order in orders {
+            assert!((order - order.round()).abs() < ORDER, "{name}: order {order}");
+            assert!(order.round() % CYCLES_PER_TURN != 0.0, "{name}: order {order} is the sensors' own");
+        }
     }
 }

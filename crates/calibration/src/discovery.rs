@@ -310,7 +310,9 @@ fn choose(trials: &[Trial], tell: Told) -> Option<(&Trial, Origin, Vec<EffectId>
         let delayed = d.scaling.rate > 0 && !tell.speeds;
         // without the loops' record what they do to the pattern looks like mechanics
         let driven = d.stage == Stage::Mechanics && !tell.mechanics;
-        t.refuted || !d.explains(&t.candidate.values) || delayed || driven
+        // and a line in time may be one of the table or of what turns with it
+        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !tell.speeds;
+        t.refuted || !d.explains(&t.candidate.values) || delayed || driven || in_time
     };
     let described = trials.iter().find(empirical);
     let level = |t: &&Trial| !empirical(t) && t.gain >= best.gain - LEAST_LEAD && t.gain >= LEAST_GAIN;
@@ -500,9 +502,10 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
         }
         Search::Frequency => {
             let samples: usize = dense.segments.iter().map(|s| s.samples).max().unwrap_or(1);
-            // At one rate a line in time is also one in angle: nothing tells which.
+            // At one rate a line in time is also one in angle: nothing tells which, and a gyroscope has causes for both.
+            let told = bench.speeds_differ() || bench.instrument == Instrument::Sensor;
             let found = strongest_line(dense, Along::Time)
-                .filter(|(_, power)| bench.speeds_differ() && *power > LINE_OVER_DRIFT * drift_power(dense));
+                .filter(|(_, power)| told && *power > LINE_OVER_DRIFT * drift_power(dense));
             (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
         }
     }
