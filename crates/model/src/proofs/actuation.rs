@@ -222,27 +222,3 @@ pub fn proof_ratio_keeps_its_sign_f32() {
 pub fn twin_ratio_keeps_its_sign_f32() {
     ratio_keeps_its_sign(-1.0_f32);
 }
-
-fn common_factor_drops_out<T: Float + Arbitrary>(factors: (T, T)) {
-    let (tau_0, v_0, tau_90, v_90): (T, T, T, T) = (kani::any(), kani::any(), kani::any(), kani::any());
-    let a = actuation_gain_ratio(tau_0, v_0, tau_90, v_90);
-    let b = actuation_gain_ratio(tau_0, factors.0 * v_0, tau_90, factors.1 * v_90);
-    kani::cover!(a > T::two() && a.is_finite(), "X is stronger");
-    kani::cover!(is_nan(a), "no number");
-    assert!(a == b || (is_nan(a) && is_nan(b)));
-}
-
-//= specs/equation-11.md#independence-of-the-set-amplitude
-//# A common factor on both control outputs MUST leave the ratio as it was.
-/// Reversing both outputs leaves Equation 11 ([`actuation_gain_ratio`]) as it was, for any bits of times and outputs.
-#[kani::proof]
-pub fn proof_common_factor_drops_out_f32() {
-    common_factor_drops_out((-1.0_f32, -1.0));
-}
-
-/// One output is reversed.
-#[kani::proof]
-#[kani::should_panic]
-pub fn twin_common_factor_drops_out_f32() {
-    common_factor_drops_out((-1.0_f32, 1.0));
-}
