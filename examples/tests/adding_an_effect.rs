@@ -96,12 +96,12 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
             }
         }
     }
-    // what is built for this test serves the copy too; its own crates lie elsewhere and so have names of their own
+    // builds of its own: cargo names crates by their place within the workspace, and would take the copy's for ours
     let target = std::env::current_exe()?.ancestors().nth(3).map(Path::to_owned).ok_or("no folder of builds")?;
     let output = Command::new(env!("CARGO"))
         .args(["test", "--workspace", "--locked", "--test", "effects", "--test", "cross_cubic"])
         .current_dir(folder.path())
-        .env("CARGO_TARGET_DIR", target)
+        .env("CARGO_TARGET_DIR", target.join("adding-an-effect"))
         .env("INSTA_UPDATE", "always")
         .output()?;
     let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
