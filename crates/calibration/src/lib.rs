@@ -37,6 +37,7 @@ pub mod actuation;
 mod balance;
 pub mod bias;
 pub mod calibration;
+mod candidates;
 mod channels;
 mod compensate;
 mod consistency;

@@ -1,0 +1,185 @@
+//! Which effects a residual proposes: those of the library that fit the instrument and its campaign, where they are told
+//! by a search at the harmonics, orders and lines that stand out.
+
+use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values, harmonic_n};
+
+use crate::evaluate::Evaluation;
+use crate::hypothesis::Hypothesis;
+use crate::identify::Bench;
+use crate::recording::Instrument;
+use crate::residual::{Along, Follows, drift_power, resolved_harmonics, strongest_harmonics, strongest_line};
+
+/// Harmonics of the pattern and of the table that are looked at.
+const PATTERN_HARMONICS: u32 = 24;
+const TABLE_HARMONICS: u32 = 64;
+/// Strongest harmonics that become candidates.
+const PROPOSALS: usize = 3;
+
+/// A way to extend a hypothesis.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Candidate {
+    pub(crate) id: EffectId,
+    /// starting values
+    pub(crate) values: Values<f64>,
+    /// refine this member instead of adding one
+    pub(crate) refine: Option<usize>,
+    /// how many alternatives the search behind it went through
+    pub(crate) tried: f64,
+}
+
+/// Every way to extend a hypothesis on this bench.
+pub(crate) fn candidates(
+    bench: &Bench,
+    hypothesis: &Hypothesis,
+    residual: &Evaluation,
+    dense: &Evaluation,
+) -> Vec<Candidate> {
+    let sensor = bench.instrument == Instrument::Sensor;
+    let commands = bench.tracks.iter().any(|t| t.track.has_commands());
+    let mut out = Vec::new();
+    for &id in EffectId::ALL {
+        let d = id.description();
+        if d.declared || (sensor && !d.in_sensors) || (d.stage == Stage::Actuation && !commands) {
+            continue;
+        }
+        if d.scaling.rate > 0 && !bench.rate_varies() {
+            // a constant per rate hides in the bias of each run
+            continue;
+        }
+        let searched = d.parameters.iter().enumerate().find_map(|(p, parameter)| match parameter.role {
+            ParameterRole::Searched(over) | ParameterRole::Located(over) => Some((p, over)),
+            _ => None,
+        });
+        let chosen = d.parameters.iter().position(|p| matches!(p.role, ParameterRole::Chosen(_)));
+        let plain = Candidate { id, values: id.neutral(), refine: None, tried: 1.0 };
+        if let Some((p, over)) = searched {
+            let taken = |values: &Values<f64>| {
+                let same = |q: usize, m: &Values<f64>| (m[q] - values[q]).abs() < 1e-3 * values[q].abs().max(1e-3);
+                hypothesis
+                    .members
+                    .iter()
+                    .any(|m| m.id == id && same(p, &m.values) && chosen.is_none_or(|c| same(c, &m.values)))
+            };
+            let (found, tried) = proposals(bench, residual, dense, over);
+            let proposed = found.into_iter().map(|(value, choice)| {
+                let mut values = id.neutral();
+                values[p] = value;
+                if let Some(c) = chosen {
+                    values[c] = choice;
+                }
+                values
+            });
+            out.extend(proposed.filter(|v| !taken(v)).take(PROPOSALS).map(|values| Candidate {
+                values,
+                tried,
+                ..plain.clone()
+            }));
+            continue;
+        }
+        match hypothesis.position(id) {
+            None if d.onsets.is_empty() => out.push(plain),
+            None => {
+                let amplitude = largest_component(bench);
+                for onset in d.onsets {
+                    let mut values = id.neutral();
+                    values[0] = onset / amplitude;
+                    out.push(Candidate { values, tried: d.onsets.len() as f64, ..plain.clone() });
+                }
+            }
+            Some(member)
+                if !hypothesis.members[member].refined
+                    && d.parameters.iter().any(|p| p.role == ParameterRole::Refined) =>
+            {
+                out.push(Candidate { refine: Some(member), ..plain });
+            }
+            Some(_) => {}
+        }
+    }
+    out
+}
+
+/// Values that a searched parameter could take with what goes with each of them, strongest first, and how many were
+/// looked at.
+fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<(f64, f64)>, f64) {
+    match over {
+        Search::PatternHarmonic => {
+            let most = resolved_harmonics(residual, Follows::Pattern, PATTERN_HARMONICS);
+            let scalings = scalings(bench);
+            let mut found: Vec<(f64, f64, f64)> = Vec::new();
+            for &scaling in &scalings {
+                let size = |precession: f64| harmonic_n::factor(scaling, precession);
+                let lines = strongest_harmonics(residual, Follows::Pattern, most, size);
+                found.extend(lines.into_iter().take(PROPOSALS).map(|(n, power)| (power, f64::from(n), scaling)));
+            }
+            found.sort_by(|a, b| b.0.total_cmp(&a.0));
+            // a second harmonic against the rate is anisodamping, which is declared
+            let anisodamping = (2.0, harmonic_n::scaling::INVERSE_RATE);
+            let mut found: Vec<(f64, f64)> =
+                found.into_iter().map(|(_, n, scaling)| (n, scaling)).filter(|f| *f != anisodamping).collect();
+            if bench.rate_varies() && scalings.contains(&harmonic_n::scaling::DIRECTION) {
+                // a step between the directions is not seen in the angle's harmonics
+                found.insert(0, (0.0, harmonic_n::scaling::DIRECTION));
+            }
+            (found, f64::from(most.max(1)) * scalings.len() as f64)
+        }
+        Search::TableOrder { .. } => {
+            let most = resolved_harmonics(residual, Follows::Table, TABLE_HARMONICS);
+            let lines = strongest_harmonics(residual, Follows::Table, most, |_| 1.0);
+            let mut found: Vec<(f64, f64)> = lines.iter().take(2).map(|(n, _)| (f64::from(*n), 0.0)).collect();
+            // At one rate a broken order of the table is a line in time.
+            let strongest = lines.first().map_or(0.0, |l| l.1);
+            let broken = strongest_line(residual, Along::Table).filter(|(order, power)| {
+                bench.speeds_differ()
+                    && *power > 2.0 * strongest
+                    && *order > 0.5
+                    && *order < f64::from(most)
+                    && (order - order.round()).abs() > BROKEN_ORDER
+            });
+            found.splice(0..0, broken.map(|(order, _)| (order, 0.0)));
+            (found, f64::from(most.max(1)))
+        }
+        Search::Frequency => {
+            let samples: usize = dense.segments.iter().map(|s| s.samples).max().unwrap_or(1);
+            // At one rate a line in time is also one in angle: nothing tells which, and a gyroscope has causes for both.
+            let told = bench.speeds_differ() || bench.instrument == Instrument::Sensor;
+            let found = strongest_line(dense, Along::Time)
+                .filter(|(_, power)| told && *power > LINE_OVER_DRIFT * drift_power(dense));
+            (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
+        }
+    }
+}
+
+/// An order of the table this far from a whole one is broken.
+const BROKEN_ORDER: f64 = 0.02;
+/// A line in time takes this many times more out of the residual than a slow drift of every run could.
+const LINE_OVER_DRIFT: f64 = 1.5;
+
+/// How a harmonic may scale, as far as the fitted runs can tell.
+fn scalings(bench: &Bench) -> Vec<f64> {
+    use harmonic_n::scaling::{CONSTANT, DIRECTION, INVERSE_RATE, RATE};
+    let mut all = vec![CONSTANT];
+    if bench.both_directions() {
+        all.push(DIRECTION);
+    }
+    if bench.speeds_differ() {
+        all.extend([RATE, INVERSE_RATE]);
+    }
+    all
+}
+
+/// The largest in-phase readout of any channel, V, spikes aside.
+fn largest_component(bench: &Bench) -> f64 {
+    let mut sizes: Vec<f64> = bench
+        .tracks
+        .iter()
+        .flat_map(|t| {
+            let stride = (t.track.t_s.len() / 2000).max(1);
+            (0..t.track.t_s.len()).step_by(stride).map(|i| {
+                let e = t.track.envelope(i);
+                e.x_c.abs().max(e.y_c.abs())
+            })
+        })
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-12)
+}
