@@ -24,7 +24,7 @@ use crate::recording::{Instrument, Role};
 use crate::report::{ChannelHarmonic, ChannelLine, ChannelReport, Exponent, HarmonicScaling};
 use crate::residual::{
     Along, Follows, Harmonic, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, harmonics, inflation,
-    ljung_box, resolved_harmonics, strongest_line,
+    ljung_box, resolved_harmonics, strongest_line, white_band,
 };
 
 /// Harmonics of the pattern and of the table that are looked at.
@@ -37,8 +37,6 @@ const LEAST_SPREAD: f64 = 0.1;
 const LEAST_NOISE_SHARE: f64 = 1e-3;
 /// exp(−power/2) times the number of lines looked at, from which a line is no accident.
 const ACCIDENT: f64 = 1e-3;
-/// Samples of white noise stay within this many deviations at 99 % of the lags.
-const BAND99: f64 = 2.576;
 
 /// What a channel is called and counted in, and one sample of it.
 struct Channel {
@@ -170,7 +168,7 @@ fn analysis(stage: &str, channel: &str, unit: &str, e: &Evaluation, amplitudes: 
         unit: unit.into(),
         rms: own(mean_square.sqrt().to_degrees()),
         white: ljung_box(&correlation, count) >= WHITENESS_LEVEL,
-        band99: BAND99 / (count.max(1) as f64).sqrt(),
+        band99: white_band(count),
         autocorrelation: correlation,
         harmonics: found,
         line,

@@ -243,11 +243,7 @@ impl Bench {
     pub(crate) fn alike(&self) -> Alike {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
         let ends = fitted
-            .map(|p| {
-                let count = p.track.t_s.len();
-                let sampled = (0..count).step_by((count / STRETCHES).max(1));
-                median(&mut sampled.map(|i| p.track.envelope(i).pendulum().e.sqrt()).collect::<Vec<_>>())
-            })
+            .map(|p| p.track.mean_amplitude())
             .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), a| (low.min(a), high.max(a)));
         Alike {
             direction: !self.both_directions(),

@@ -10,7 +10,7 @@ use crate::hypothesis::{Hypothesis, Unknown, Unknowns, Vibration};
 use crate::identify::Bench;
 use crate::pass::{Pace, Start, walk};
 use crate::recording::{Instrument, Role};
-use crate::residual::{Follows, Harmonic, WHITENESS_LAGS, autocorrelation, harmonics, inflation, resolved_harmonics};
+use crate::residual::{Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band};
 use crate::statistics::{circular_mean, line};
 use crate::track::wrapped;
 
@@ -152,8 +152,6 @@ const BINS: usize = 72;
 const BINNED_SAMPLES: usize = 40_000;
 /// Harmonics of the period in the amplitude that the energy balance allows for.
 const AMPLITUDE_HARMONICS: usize = 4;
-/// Harmonics of the pattern that are shown.
-const SHOWN_HARMONICS: u32 = 8;
 /// Lags of the autocorrelation.
 const LAGS: usize = 60;
 /// A sample further off than this is a spike whatever a hypothesis lacks.
@@ -272,14 +270,10 @@ impl Scene<'_> {
 
     fn stages(&self) -> Vec<(String, Vec<Harmonic>)> {
         // the noise is that of the last stage: what the others have besides is no noise
-        let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         [("raw", self.raw), ("declared", Some(self.declared)), ("discovered", Some(self.discovered))]
             .into_iter()
             .filter_map(|(name, e)| e.map(|e| (name, e)))
-            .map(|(name, e)| {
-                let most = resolved_harmonics(e, Follows::Pattern, SHOWN_HARMONICS);
-                (name.to_owned(), harmonics(e, Follows::Pattern, most, inflated))
-            })
+            .map(|(name, e)| (name.to_owned(), reported_harmonics(e, Follows::Pattern, self.discovered)))
             .collect()
     }
 
@@ -307,11 +301,7 @@ impl Scene<'_> {
 
     fn memory(&self) -> Memory {
         let count = self.discovered.errors().count();
-        Memory {
-            correlation: autocorrelation(self.discovered, LAGS),
-            // 99 % of a normal distribution
-            band99: 2.576 / (count.max(1) as f64).sqrt(),
-        }
+        Memory { correlation: autocorrelation(self.discovered, LAGS), band99: white_band(count) }
     }
 
     fn histogram(&self) -> Histogram {
@@ -357,7 +347,7 @@ impl Scene<'_> {
             EffectSize {
                 name: track.name.clone(),
                 rate_dps: track.mean_rate().to_degrees(),
-                amplitude_v: mean_amplitude(track),
+                amplitude_v: track.mean_amplitude(),
                 measured_deg: [(1.0 + s.ed / s.dd) * fitted, 1.96 * deviation * fitted].map(f64::to_degrees),
                 fitted_deg: fitted.to_degrees(),
             }
@@ -487,14 +477,6 @@ fn slope_of(values: &[f64], period: f64) -> Vec<f64> {
         }
     }
     out
-}
-
-/// Mean amplitude of the readout over a run, V.
-fn mean_amplitude(track: &crate::track::Track) -> f64 {
-    let stride = (track.t_s.len() / 500).max(1);
-    let sizes = track.segments.iter().flat_map(|s| s.range.clone()).step_by(stride);
-    let (n, sum) = sizes.fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + track.envelope(i).pendulum().e.sqrt()));
-    sum / f64::max(n, 1.0)
 }
 
 #[cfg(test)]

@@ -313,6 +313,11 @@ pub(crate) fn autocorrelation(evaluation: &Evaluation, most: usize) -> Vec<f64> 
 pub(crate) const WHITENESS_LAGS: usize = 20;
 pub(crate) const WHITENESS_LEVEL: f64 = 0.01;
 
+/// The autocorrelation of `count` samples of white noise stays within ± this at 99 % of the lags.
+pub(crate) fn white_band(count: usize) -> f64 {
+    2.576 / (count.max(1) as f64).sqrt()
+}
+
 /// Ljung–Box: the probability of so much autocorrelation in `count` samples of white noise.
 pub(crate) fn ljung_box(correlation: &[f64], count: usize) -> f64 {
     let n = count as f64;

@@ -151,6 +151,14 @@ impl Track {
         matches!(self.source, Source::Channels { quadrature: Some(_), .. })
     }
 
+    /// Mean amplitude of the readout over what is used of the run, V.
+    pub(crate) fn mean_amplitude(&self) -> f64 {
+        let stride = (self.t_s.len() / 500).max(1);
+        let sizes = self.segments.iter().flat_map(|s| s.range.clone()).step_by(stride);
+        let (n, sum) = sizes.fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + self.envelope(i).pendulum().e.sqrt()));
+        sum / f64::max(n, 1.0)
+    }
+
     /// The readout's amplitude was recorded, not only an angle.
     pub(crate) fn has_amplitude(&self) -> bool {
         matches!(self.source, Source::Channels { .. })
