@@ -9,9 +9,10 @@ use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::{Prepared, scaled_inverse};
-use crate::hypothesis::{Hypothesis, Unknown, Unknowns};
+use crate::hypothesis::{Hypothesis, Unknown};
 use crate::pass::{Pace, Start, walk};
 use crate::recording::{Instrument, Role};
+use crate::unknowns::Unknowns;
 
 /// The energy balance of a hypothesis, with the force scale, the damping and the anisodamping that close it best.
 #[derive(Debug, Clone)]

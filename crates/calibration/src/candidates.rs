@@ -128,12 +128,9 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
             let mut found: Vec<(f64, f64)> = lines.iter().take(2).map(|(n, _)| (f64::from(*n), 0.0)).collect();
             // At one rate a broken order of the table is a line in time.
             let strongest = lines.first().map_or(0.0, |l| l.1);
-            let broken = strongest_line(residual, Along::Table).filter(|(order, power)| {
-                bench.speeds_differ()
-                    && *power > 2.0 * strongest
-                    && *order > 0.5
-                    && *order < f64::from(most)
-                    && (order - order.round()).abs() > BROKEN_ORDER
+            let line = bench.speeds_differ().then(|| strongest_line(residual, Along::Table, 2.0 * strongest)).flatten();
+            let broken = line.filter(|(order, _)| {
+                *order > 0.5 && *order < f64::from(most) && (order - order.round()).abs() > BROKEN_ORDER
             });
             found.splice(0..0, broken.map(|(order, _)| (order, 0.0)));
             (found, f64::from(most.max(1)))
@@ -142,8 +139,8 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
             let samples: usize = dense.segments.iter().map(|s| s.samples).max().unwrap_or(1);
             // At one rate a line in time is also one in angle: nothing tells which, and a gyroscope has causes for both.
             let told = bench.speeds_differ() || bench.instrument == Instrument::Sensor;
-            let found = strongest_line(dense, Along::Time)
-                .filter(|(_, power)| told && *power > LINE_OVER_DRIFT * drift_power(dense));
+            let least = LINE_OVER_DRIFT * drift_power(dense);
+            let found = told.then(|| strongest_line(dense, Along::Time, least)).flatten();
             (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
         }
     }

@@ -13,11 +13,12 @@
 
 use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rayon::prelude::*;
 
 use crate::balance::energy_balance;
 use crate::evaluate::Evaluation;
 use crate::fit::{Fit, Residual};
-use crate::hypothesis::{Hypothesis, Unknowns};
+use crate::hypothesis::Hypothesis;
 use crate::identify::Bench;
 use crate::pass::{Pace, Row, walk};
 use crate::recording::{Instrument, Role};
@@ -26,6 +27,7 @@ use crate::residual::{
     Along, Follows, Harmonic, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, harmonics, inflation,
     ljung_box, resolved_harmonics, strongest_line, white_band,
 };
+use crate::unknowns::Unknowns;
 
 /// Harmonics of the pattern and of the table that are looked at.
 const HARMONICS: u32 = 8;
@@ -92,11 +94,10 @@ pub(crate) fn channels(bench: &Bench, fit: &Fit, stage: &str, angle: &Evaluation
     ];
     let recorded: Vec<Channel> = recorded.into_iter().filter_map(|(there, channel)| there.then_some(channel)).collect();
     let (others, amplitudes) = left(bench, fit, &closed, &recorded);
-    let mut out = vec![analysis(stage, "angle", "deg", angle, &amplitudes)];
-    for (channel, evaluation) in recorded.iter().zip(&others) {
-        out.push(analysis(stage, channel.name, channel.unit, evaluation, &amplitudes));
-    }
-    out
+    let all: Vec<_> = std::iter::once(("angle", "deg", angle))
+        .chain(recorded.iter().zip(&others).map(|(channel, evaluation)| (channel.name, channel.unit, evaluation)))
+        .collect();
+    all.into_par_iter().map(|(name, unit, evaluation)| analysis(stage, name, unit, evaluation, &amplitudes)).collect()
 }
 
 /// What is left of each channel in the fitted segments, and the mean amplitude of each segment.
@@ -157,9 +158,10 @@ fn analysis(stage: &str, channel: &str, unit: &str, e: &Evaluation, amplitudes: 
             scaling: large(h).then(|| scaling(e, h.of, h.n, noise, amplitudes)).flatten(),
         })
         .collect();
-    let told = |power: f64, looked_at: f64| looked_at * (-0.5 * power / (mean_square * inflated)).exp() < ACCIDENT;
-    let line = strongest_line(e, Along::Time)
-        .filter(|(frequency, power)| told(*power, count as f64) && !of_a_harmonic(e, *frequency))
+    // power beyond which the strongest of so many lines is no accident
+    let told = |looked_at: f64| 2.0 * mean_square * inflated * (looked_at / ACCIDENT).ln();
+    let line = strongest_line(e, Along::Time, told(count as f64))
+        .filter(|(frequency, _)| !of_a_harmonic(e, *frequency))
         .map(|(frequency_hz, power)| ChannelLine { frequency_hz, rms: rms(power) });
     let drift = drift_power(e);
     ChannelReport {
@@ -172,7 +174,7 @@ fn analysis(stage: &str, channel: &str, unit: &str, e: &Evaluation, amplitudes: 
         autocorrelation: correlation,
         harmonics: found,
         line,
-        drift_rms: told(drift, 1.0).then(|| rms(drift)),
+        drift_rms: (drift > told(1.0)).then(|| rms(drift)),
     }
 }
 

@@ -5,10 +5,11 @@ use cvg_model::effects::Moment;
 
 use crate::calibration::Calibration;
 use crate::error::Refusal;
-use crate::hypothesis::Unknowns;
 use crate::pass::{Pace, Start, walk};
+use crate::prediction::Predictor;
 use crate::recording::{Recording, Role, Run, RunKind};
 use crate::track::{Track, wrapped};
+use crate::unknowns::Unknowns;
 
 /// Compensates a recording.
 ///
@@ -39,6 +40,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let track = Track::whole(run, h.period_rad)?;
     let mut out = recording.clone();
     let none = Unknowns::new(h, Vec::new());
+    let predictor = Predictor::new(h, &none);
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     for segment in &track.segments {
         walk(&track, segment, h, &none, Start::default(), Pace::every(1), |row| {
@@ -66,7 +68,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
             if let Some(table) = &mut out.table_deg {
                 table[i] += row.excess.to_degrees();
             } else if let Some(rate) = &mut out.rate_dps {
-                rate[i] += h.excess_rate(rate[i].to_radians(), &at, &none.input).value.to_degrees();
+                rate[i] += predictor.excess_rate(rate[i].to_radians(), &at).value.to_degrees();
             }
         });
     }

@@ -4,15 +4,17 @@
 //! to solve has only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
 //! much narrower than its prior an unknown became is how much the data told of it.
 
+use cvg_model::effects::Role as ParameterRole;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::hypothesis::{Hypothesis, Unknown, Unknowns, direction};
+use crate::hypothesis::{Hypothesis, Unknown, direction};
 use crate::pass::{Pace, Start, walk};
 use crate::recording::Role;
 use crate::statistics::circular_mean;
 use crate::sums::Sums;
 use crate::track::{Segment, Track};
+use crate::unknowns::Unknowns;
 
 /// A Gaussian belief about an unknown before the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,8 +96,10 @@ const LARGEST_SET_ASIDE: f64 = 0.2;
 const WIDEST: f64 = 1e6;
 /// How fast unrecorded commands precess a pattern, rad/s: tan(θ_error)/τ for an angle wrong by 10 mrad and τ = 10 s.
 const DRIFT_RAD_S: f64 = 1e-3;
-/// A step is the last when no unknown moves by more than this share of its standard deviation.
+/// A step is the last when after it no unknown is wrong by more than this share of its standard deviation.
 const CONVERGED: f64 = 0.02;
+/// A change of the angle by δ rad bends a residual by less than this times δ².
+const BEND: f64 = 10.0;
 
 /// Fits `hypothesis` to the segments of `role` of all tracks.
 pub(crate) fn fit(
@@ -161,7 +165,9 @@ pub(crate) fn fit(
             result.covariance = covariance;
         }
         let deviation = |i: usize| result.covariance[(i, i)].max(0.0).sqrt();
-        let small = (0..n).all(|i| step[i].abs() <= CONVERGED * deviation(i) + f64::MIN_POSITIVE);
+        // what the step moves, or what it leaves because the residuals are not straight
+        let left = |i: usize| step[i].abs().min(bend(&from.hypothesis, unknowns[i]) * step[i] * step[i]);
+        let small = (0..n).all(|i| left(i) <= CONVERGED * deviation(i) + f64::MIN_POSITIVE);
         best = Some(from);
         if last {
             break;
@@ -177,6 +183,25 @@ pub(crate) fn fit(
         }
     }
     result
+}
+
+/// By how much at most a step of an unknown misses the minimum, per square of the step.
+fn bend(hypothesis: &Hypothesis, unknown: Unknown) -> f64 {
+    match unknown {
+        // the angle is a straight line of k, the amplitude of 1/τ
+        Unknown::AngularGain | Unknown::Damping => 0.0,
+        // multiplied by the drive's other unknowns
+        Unknown::ForceScale => 1.0 / hypothesis.force_scale.abs().max(f64::MIN_POSITIVE),
+        // the delay turns with the pattern, at some ten radians per second
+        Unknown::ControlLatency => BEND,
+        Unknown::Effect(i, p) => {
+            let parameters = hypothesis.members[i].id.description().parameters;
+            // a frequency is multiplied by the line's own size and by the length of the run
+            let located = parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_)));
+            // scales are those of a milliradian
+            if located { f64::INFINITY } else { BEND * 1e-3 / parameters[p].scale }
+        }
+    }
 }
 
 /// The least-squares problem around one hypothesis.

@@ -7,13 +7,14 @@ use crate::actuation::{DriveGains, RingDown, ring_down};
 use crate::balance::energy_balance;
 use crate::error::Refusal;
 use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
-use crate::hypothesis::{Hypothesis, Origin, Unknown, Unknowns};
+use crate::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::identifiability::Alike;
 use crate::pass::{Pace, walk};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 use crate::start::{Ellipse, motion};
 use crate::statistics::{median, robust_deviation, white_noise};
 use crate::track::Track;
+use crate::unknowns::Unknowns;
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
 pub mod belief {

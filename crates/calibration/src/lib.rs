@@ -52,6 +52,7 @@ mod identify;
 mod jet;
 mod pass;
 pub mod picture;
+mod prediction;
 pub mod recording;
 pub mod report;
 mod residual;
@@ -61,6 +62,7 @@ mod statistics;
 mod sums;
 mod track;
 mod unexplained;
+mod unknowns;
 
 pub use compensate::compensate;
 pub use error::{Cause, Refusal};

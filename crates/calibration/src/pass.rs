@@ -8,10 +8,12 @@
 use cvg_model::Envelope;
 use cvg_model::effects::Moment;
 
-use crate::hypothesis::{Hypothesis, Unknowns, Vibration, quantity};
+use crate::hypothesis::Hypothesis;
 use crate::jet::Jet;
+use crate::prediction::{Predictor, Vibration, quantity};
 use crate::recording::Instrument;
 use crate::track::{Segment, Track, wrapped};
+use crate::unknowns::Unknowns;
 
 /// What a pass says of one sample.
 #[derive(Debug)]
@@ -84,6 +86,7 @@ pub(crate) fn walk(
 ) {
     let stride = pace.stride;
     let n = unknowns.all.len();
+    let predictor = Predictor::new(hypothesis, unknowns);
     let mut vibration = Vibration::new();
     // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
     let mut integrals = Integrals::new(2 * (n + 1));
@@ -96,10 +99,9 @@ pub(crate) fn walk(
     let harmonic = hypothesis.input_harmonic();
     let zero_input = track.input_rad[segment.range.start];
     if harmonic > 0.0 {
-        let none = Unknowns::new(hypothesis, Vec::new());
         let before: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
         for step in before.windows(2) {
-            ahead += excess_angle(track, (step[0], ahead), step[1], hypothesis, &none, harmonic).value;
+            ahead += excess_angle(track, (step[0], ahead), step[1], &predictor, harmonic).value;
         }
     }
     let mut last: Option<usize> = None;
@@ -108,7 +110,7 @@ pub(crate) fn walk(
         let rate = track.rate(i);
         let at =
             Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: hypothesis.precession(rate) };
-        hypothesis.evaluate(track.envelope(i), track.commands(i, stride), &at, unknowns, &mut vibration);
+        predictor.predict(track.envelope(i), track.commands(i, stride), &at, &mut vibration);
         if hypothesis.instrument == Instrument::Gyroscope {
             integrands[0] = vibration.theta_rate;
             integrands[n + 1] = vibration.growth;
@@ -118,7 +120,7 @@ pub(crate) fn walk(
             }
         }
         if let Some(from) = last.filter(|_| harmonic > 0.0) {
-            excess = excess + excess_angle(track, (from, ahead + excess.value), i, hypothesis, unknowns, harmonic);
+            excess = excess + excess_angle(track, (from, ahead + excess.value), i, &predictor, harmonic);
         }
         last = Some(i);
         let turned = track.input_rad[i] - zero_input;
@@ -173,8 +175,7 @@ fn excess_angle(
     track: &Track,
     (from, excess): (usize, f64),
     to: usize,
-    hypothesis: &Hypothesis,
-    unknowns: &Unknowns,
+    predictor: &Predictor<'_>,
     harmonic: f64,
 ) -> Jet {
     let (t0, t1) = (track.t_s[from], track.t_s[to]);
@@ -190,9 +191,9 @@ fn excess_angle(
             let at = Moment {
                 t_s: t0 + s * (t1 - t0),
                 table_rad: a0 + s * (a1 - a0) + excess + 0.5 * h * (t1 - t0) * sum.value,
-                precession_rad_s: hypothesis.precession(rate),
+                precession_rad_s: predictor.hypothesis.precession(rate),
             };
-            sum = sum + hypothesis.excess_rate(rate, &at, &unknowns.input);
+            sum = sum + predictor.excess_rate(rate, &at);
         }
     }
     sum * Jet::constant(0.5 * h * (t1 - t0))

@@ -6,13 +6,15 @@ use nalgebra::DMatrix;
 
 use crate::evaluate::Evaluation;
 use crate::fit::Fit;
-use crate::hypothesis::{Hypothesis, Unknown, Unknowns, Vibration};
+use crate::hypothesis::{Hypothesis, Unknown};
 use crate::identify::Bench;
 use crate::pass::{Pace, Start, walk};
+use crate::prediction::{Predictor, Vibration};
 use crate::recording::{Instrument, Role};
 use crate::residual::{Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band};
 use crate::statistics::{circular_mean, line};
 use crate::track::wrapped;
+use crate::unknowns::Unknowns;
 
 /// Curves for the figures of a report.
 #[derive(Debug, Clone, Default)]
@@ -223,6 +225,7 @@ impl Scene<'_> {
         }
         let h = self.hypothesis();
         let none = Unknowns::new(h, Vec::new());
+        let predictor = Predictor::new(h, &none);
         let ideal = Hypothesis { members: Vec::new(), ..h.clone() };
         let samples: usize = track.segments.iter().map(|s| s.range.len()).sum();
         let stride = (samples / BINNED_SAMPLES).max(1);
@@ -240,8 +243,8 @@ impl Scene<'_> {
             let commands = track.commands(i, stride)?;
             let rate = track.rate(i);
             let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: h.precession(rate) };
-            h.evaluate(seen, Some(commands), &at, &none, &mut with);
-            h.evaluate(seen, None, &at, &none, &mut without);
+            predictor.predict(seen, Some(commands), &at, &mut with);
+            predictor.predict(seen, None, &at, &mut without);
             let push = with.growth - without.growth;
             if !push.is_finite() || !with.ln_amplitude.is_finite() {
                 continue;

@@ -7,7 +7,7 @@ use std::ops::Range;
 use cvg_model::{ControlOutputs, Envelope};
 
 use crate::error::Refusal;
-use crate::hypothesis::Commands;
+use crate::prediction::Commands;
 use crate::recording::{Recording, Role, Run};
 
 /// A rotation run, ready for a fit.

@@ -98,9 +98,9 @@ pub(crate) fn unexplained(
         }
     }
     let worth_saying = bench.speeds_differ() || out.is_empty();
-    if let Some((frequency, power)) =
-        strongest_line(dense, Along::Time).filter(|(_, power)| worth_saying && remarkable(*power, count))
-    {
+    let least = count * (SMALLEST_SHARE * floor).powi(2);
+    let line = worth_saying.then(|| strongest_line(dense, Along::Time, least)).flatten();
+    if let Some((frequency, power)) = line.filter(|(_, power)| remarkable(*power, count)) {
         out.push(Unexplained {
             class: "time-periodic".into(),
             n: None,

@@ -1,0 +1,279 @@
+//! What a hypothesis says of one sample: the vibration behind the readout, how it must move, and the slopes of both.
+
+use cvg_estimator::direction::{Direction, major_axis};
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Stage, Values};
+use cvg_model::{ActuationGains, ControlOutputs, Envelope, Real};
+
+use crate::hypothesis::{Hypothesis, Unknown};
+use crate::jet::Jet;
+use crate::recording::Instrument;
+use crate::unknowns::{Lanes, Unknowns};
+
+/// The controllers' outputs around one sample, V and V/s.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Commands {
+    pub(crate) now: ControlOutputs<f64>,
+    pub(crate) change_per_s: ControlOutputs<f64>,
+}
+
+/// The vibration at one sample, as a hypothesis sees it, with slopes.
+#[derive(Debug, Clone)]
+pub(crate) struct Vibration {
+    /// bearing of the pattern within its period, rad, and ln of the amplitude
+    pub(crate) theta: f64,
+    pub(crate) ln_amplitude: f64,
+    /// the vibration itself
+    pub(crate) envelope: Envelope<f64>,
+    /// how fast the hypothesis lets it turn and grow besides −kΩ, rad/s and 1/s
+    pub(crate) theta_rate: f64,
+    pub(crate) growth: f64,
+    /// slopes of the four against the unknowns, in their order
+    pub(crate) slopes: Vec<[f64; 4]>,
+}
+
+/// Index of the four quantities of [`Vibration`] in its slopes.
+pub(crate) mod quantity {
+    pub(crate) const THETA: usize = 0;
+    pub(crate) const LN_AMPLITUDE: usize = 1;
+    pub(crate) const THETA_RATE: usize = 2;
+    pub(crate) const GROWTH: usize = 3;
+}
+
+/// Effects that act in one stage, one after the other, with their values.
+type Chain<T> = Vec<(EffectId, Values<T>)>;
+
+/// A hypothesis made ready to be asked about many samples: its members sorted by stage, their values with the slopes
+/// that are asked for.
+pub(crate) struct Predictor<'h> {
+    pub(crate) hypothesis: &'h Hypothesis,
+    unknowns: &'h Unknowns,
+    /// for each group of lanes, last effect first
+    readout: Vec<Chain<Jet>>,
+    /// as they are, and without slopes of their own for vibrations that have them
+    mechanics: Chain<f64>,
+    mechanics_of_jets: Chain<Jet>,
+    /// columns of mechanics unknowns, and the effect with a one in that place: mechanics are linear
+    units: Vec<(usize, EffectId, Values<f64>)>,
+    actuation: Drive<f64>,
+    actuation_of_jets: Drive<Jet>,
+    input: Chain<Jet>,
+}
+
+/// What makes forces of commands.
+struct Drive<T> {
+    force_scale: T,
+    control_latency_s: T,
+    effects: Chain<T>,
+}
+
+impl<'h> Predictor<'h> {
+    /// Makes `hypothesis` ready for slopes against `unknowns`.
+    pub(crate) fn new(hypothesis: &'h Hypothesis, unknowns: &'h Unknowns) -> Self {
+        let jets = |stage: Stage, lanes: &Lanes| -> Chain<Jet> {
+            hypothesis.acting(stage).map(|(i, m)| (m.id, lanes.values(i, m))).collect()
+        };
+        let plain = |stage| -> Chain<f64> { hypothesis.acting(stage).map(|(_, m)| (m.id, m.values)).collect() };
+        let mechanics = plain(Stage::Mechanics);
+        let of_column = |&column: &usize| match unknowns.all[column] {
+            Unknown::Effect(member, p) => {
+                let mut unit = [0.0; MAX_PARAMETERS];
+                unit[p] = 1.0;
+                Some((column, hypothesis.members[member].id, unit))
+            }
+            _ => None,
+        };
+        let lanes = &unknowns.forcing;
+        Self {
+            hypothesis,
+            unknowns,
+            readout: unknowns
+                .readout
+                .iter()
+                .map(|lanes| jets(Stage::Readout, lanes).into_iter().rev().collect())
+                .collect(),
+            mechanics_of_jets: mechanics.iter().map(|(id, values)| (*id, values.map(Jet::constant))).collect(),
+            mechanics,
+            units: unknowns.mechanics.iter().filter_map(of_column).collect(),
+            actuation: Drive {
+                force_scale: hypothesis.force_scale,
+                control_latency_s: hypothesis.control_latency_s,
+                effects: plain(Stage::Actuation),
+            },
+            actuation_of_jets: Drive {
+                force_scale: lanes.jet(hypothesis.force_scale, lanes.force_scale),
+                control_latency_s: lanes.jet(hypothesis.control_latency_s, lanes.control_latency),
+                effects: jets(Stage::Actuation, lanes),
+            },
+            input: jets(Stage::Input, &unknowns.input),
+        }
+    }
+
+    /// One sample: the readout `seen`, the commands given then.
+    pub(crate) fn predict(
+        &self,
+        seen: Envelope<f64>,
+        commands: Option<Commands>,
+        at: &Moment<f64>,
+        out: &mut Vibration,
+    ) {
+        use quantity::{GROWTH, LN_AMPLITUDE, THETA, THETA_RATE};
+        let (hypothesis, unknowns) = (self.hypothesis, self.unknowns);
+        out.slopes.clear();
+        out.slopes.resize(unknowns.all.len(), [0.0; 4]);
+        let lanes = &unknowns.forcing;
+        let commands = commands.filter(|_| hypothesis.force_scale != 0.0 || !lanes.columns.is_empty());
+        let seen_axis = commands.map(|_| major_axis(&seen, &seen.pendulum()));
+        let (mut forced, mut forced_slopes) = (None, None);
+        if let Some((v, axis)) = commands.zip(seen_axis) {
+            if lanes.columns.is_empty() {
+                forced = Some(self.actuation.rate(&v, &axis, at.precession_rad_s, |x| x));
+            } else {
+                let rate = self.actuation_of_jets.rate(&v, &axis, at.precession_rad_s, Jet::constant);
+                forced = Some(part(&rate, |j| j.value));
+                forced_slopes = Some(rate);
+            }
+        }
+        let mechanical = hypothesis.instrument == Instrument::Gyroscope;
+        let mut z = Envelope::zero();
+        if self.readout.is_empty() {
+            z = hypothesis.unread(seen, at);
+            out.theta = hypothesis.bearing(&z);
+        }
+        for (chain, lanes) in self.readout.iter().zip(&unknowns.readout) {
+            let moment = constant_moment(at);
+            let jets = chain.iter().fold(lifted(&seen), |e, (id, values)| id.unread(values, e, &moment));
+            let theta = hypothesis.bearing(&jets);
+            let energy = jets.pendulum().e;
+            let theta_rate = mechanical.then(|| jets.precession(&self.rate_of(&jets, forced.as_ref())));
+            for (lane, &i) in lanes.columns.iter().enumerate() {
+                out.slopes[i][THETA] = theta.slope[lane];
+                out.slopes[i][LN_AMPLITUDE] = 0.5 * energy.slope[lane] / energy.value;
+                out.slopes[i][THETA_RATE] = theta_rate.map_or(0.0, |r| r.slope[lane]);
+            }
+            z = part(&jets, |j| j.value);
+            out.theta = theta.value;
+        }
+        out.envelope = z;
+        out.ln_amplitude = 0.5 * z.pendulum().e.ln();
+        (out.theta_rate, out.growth) = (0.0, 0.0);
+        if !mechanical {
+            return;
+        }
+        let gradient = Gradient::of(&z);
+        for (id, values) in &self.mechanics {
+            let (turn, grow) = gradient.along(&id.mechanics(values, &z));
+            out.theta_rate += turn;
+            out.growth += grow;
+        }
+        for (i, id, unit) in &self.units {
+            let (turn, grow) = gradient.along(&id.mechanics(unit, &z));
+            out.slopes[*i][THETA_RATE] = turn;
+            out.slopes[*i][GROWTH] = grow;
+        }
+        if let Some(i) = unknowns.damping {
+            out.slopes[i][GROWTH] = -1.0;
+        }
+        out.growth -= hypothesis.damping_per_s;
+        if let Some(rate) = forced {
+            let (turn, grow) = gradient.along(&rate);
+            out.theta_rate += turn;
+            out.growth += grow;
+        }
+        if let Some(rate) = forced_slopes {
+            for (lane, &i) in lanes.columns.iter().enumerate() {
+                let (turn, grow) = gradient.along(&part(&rate, |j| j.slope[lane]));
+                out.slopes[i][THETA_RATE] += turn;
+                out.slopes[i][GROWTH] += grow;
+            }
+        }
+    }
+
+    /// How the mechanics and forces that do not depend on the readout move a vibration, per second.
+    fn rate_of(&self, z: &Envelope<Jet>, forced: Option<&Envelope<f64>>) -> Envelope<Jet> {
+        let start = forced.map_or_else(Envelope::zero, lifted);
+        self.mechanics_of_jets.iter().fold(start, |sum, (id, values)| sum + id.mechanics(values, z))
+    }
+
+    /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes.
+    pub(crate) fn excess_rate(&self, rate_rad_s: f64, at: &Moment<f64>) -> Jet {
+        let (at, nominal) = (constant_moment(at), Jet::constant(rate_rad_s));
+        self.input.iter().fold(nominal, |rate, (id, values)| id.input_rate(values, rate, &at)) - nominal
+    }
+}
+
+impl<T: Real> Drive<T> {
+    /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
+    /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects.
+    #[inline]
+    fn rate(&self, v: &Commands, seen: &Direction<f64>, precession_rad_s: f64, lift: impl Fn(f64) -> T) -> Envelope<T> {
+        let latency = self.control_latency_s;
+        let (sin_late, cos_late) = (latency * lift(precession_rad_s)).sin_cos();
+        let (cos, sin) = (lift(seen.cos), lift(seen.sin));
+        let held = |now: f64, change: f64| lift(now) - latency * lift(change);
+        let v =
+            ControlOutputs { v_as: held(v.now.v_as, v.change_per_s.v_as), v_qc: held(v.now.v_qc, v.change_per_s.v_qc) };
+        let equal = ActuationGains { x: self.force_scale, y: self.force_scale };
+        let forces = equal.axis_forces_along(&v, cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late);
+        self.effects.iter().fold(forces, |f, (id, values)| id.actuate(values, f)).envelope_rate(T::one())
+    }
+}
+
+/// One number of each component.
+#[inline]
+fn part(e: &Envelope<Jet>, of: impl Fn(Jet) -> f64) -> Envelope<f64> {
+    Envelope::new(of(e.x_c), of(e.x_s), of(e.y_c), of(e.y_s))
+}
+
+/// An envelope that does not depend on the unknowns.
+#[inline]
+fn lifted(e: &Envelope<f64>) -> Envelope<Jet> {
+    Envelope::new(Jet::constant(e.x_c), Jet::constant(e.x_s), Jet::constant(e.y_c), Jet::constant(e.y_s))
+}
+
+fn constant_moment(at: &Moment<f64>) -> Moment<Jet> {
+    Moment {
+        t_s: Jet::constant(at.t_s),
+        table_rad: Jet::constant(at.table_rad),
+        precession_rad_s: Jet::constant(at.precession_rad_s),
+    }
+}
+
+/// How the pattern angle and ln of the amplitude change with the envelope: linear in its rate of change.
+struct Gradient {
+    theta: Envelope<f64>,
+    growth: Envelope<f64>,
+}
+
+impl Gradient {
+    fn of(z: &Envelope<f64>) -> Self {
+        let p = z.pendulum();
+        let k = 1.0 / (p.r * p.r + p.s * p.s);
+        // θ̇ = ½(RṠ − SṘ)/(R² + S²), written out in the components of the envelope's rate
+        let theta = Envelope::new(
+            k * (p.r * z.y_c - p.s * z.x_c),
+            k * (p.r * z.y_s - p.s * z.x_s),
+            k * (p.r * z.x_c + p.s * z.y_c),
+            k * (p.r * z.x_s + p.s * z.y_s),
+        );
+        Self { theta, growth: *z * (1.0 / p.e) }
+    }
+
+    /// (θ̇, ȧ/a) at the envelope's rate `d`.
+    fn along(&self, d: &Envelope<f64>) -> (f64, f64) {
+        let dot = |g: &Envelope<f64>| g.x_c * d.x_c + g.x_s * d.x_s + g.y_c * d.y_c + g.y_s * d.y_s;
+        (dot(&self.theta), dot(&self.growth))
+    }
+}
+
+impl Vibration {
+    pub(crate) fn new() -> Self {
+        Self {
+            theta: 0.0,
+            ln_amplitude: 0.0,
+            envelope: Envelope::new(0.0, 0.0, 0.0, 0.0),
+            theta_rate: 0.0,
+            growth: 0.0,
+            slopes: Vec::new(),
+        }
+    }
+}
