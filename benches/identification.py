@@ -17,8 +17,8 @@ its default method "trf" and MINPACK's "lm" are timed.
 
 Of cvg, `process` is all of `cvg identify CAMPAIGN --json`: start, reading, ring-downs, three rounds of fits, the search for
 undeclared effects, held-out errors, report. `library` is the declared model alone (three rounds of fits with ring-downs,
-held-out errors, report), from `cargo bench -p cvg-calibration --bench identify`; it names no cubic effect, so it stands
-beside scipy where there is none.
+held-out errors, report), `fits` is that part of it which scipy is timed for: the fits, all rounds. Both are from `cargo bench
+-p cvg-calibration --bench identify`; they name no cubic effect, so they stand beside scipy where there is none.
 
 The two must agree on the detection gain ratio within 5e-5, or nothing is timed. Times are medians; both sides are divided
 by the same number of residuals of the fit.
@@ -173,12 +173,15 @@ def run_cvg(cvg, campaign):
 
 
 def library():
-    """Seconds of the declared model alone through the library, by criterion (median)."""
-    subprocess.run(["cargo", "bench", "-q", "-p", "cvg-calibration", "--bench", "identify", "--", "declared model"],
+    """Seconds of the declared model alone through the library, whole and the fits in it, by criterion (medians)."""
+    subprocess.run(["cargo", "bench", "-q", "-p", "cvg-calibration", "--bench", "identify", "--", "declared model|alone"],
                    cwd=ROOT, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    estimates = next((target / "criterion").glob("identify/*declared*/new/estimates.json"))
-    return json.loads(estimates.read_text(encoding="utf-8"))["median"]["point_estimate"] * 1e-9
+    criterion = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "criterion" / "identify"
+    times = {}
+    for name, pattern in (("library", "*declared*"), ("fits", "*alone*")):
+        estimates = next(criterion.glob(f"{pattern}/new/estimates.json"))
+        times[name] = json.loads(estimates.read_text(encoding="utf-8"))["median"]["point_estimate"] * 1e-9
+    return times
 
 
 def compare(title, cvg, campaign, rounds, beside=None):
@@ -202,13 +205,13 @@ def compare(title, cvg, campaign, rounds, beside=None):
             if abs(fit.x[1] - ours) > AGREEMENT:
                 sys.exit("scipy and cvg do not agree on the detection gain ratio")
     median = {name: [statistics.median(column) for column in zip(*values)] for name, values in times.items()}
-    if beside is not None:
-        median["library"] = [beside, None]
+    for name, seconds in (beside or {}).items():
+        median[name] = [seconds, None]
     for name, (wall, processor) in median.items():
-        who = f"cvg {name}" if name in ("process", "library") else f"scipy {name}"
+        who = f"scipy {name}" if name in ("trf", "lm") else f"cvg {name}"
         text = f"  {who:12} {1e6 * wall / runs.samples:8.2f} us per residual"
         text += "" if processor is None else f", processor {1e6 * processor / runs.samples:8.2f}"
-        if name in ("process", "library"):
+        if name not in ("trf", "lm"):
             text += "   " + ", ".join(
                 f"{median[m][0] / wall:.2f} times as fast as {m}"
                 + ("" if processor is None else f" ({median[m][1] / processor:.2f} by processor time)")

@@ -4,9 +4,11 @@
 //! written by `cvg simulate`, so that this crate knows nothing of the simulator: with the cubic readout that the
 //! declared model lacks, and without it.
 
+use std::cell::Cell;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use cvg_calibration::recording::Campaign;
@@ -33,6 +35,21 @@ fn open(campaign: &Path) -> Campaign {
     Campaign::open(campaign).expect("a simulated campaign can be read")
 }
 
+/// From the first residual to the last step of the declared model's fits: all rounds, with the noise, the spikes and the
+/// drive's gains measured in between. What is before it reads and starts, what comes after it reports.
+fn fits(campaign: Campaign) -> Duration {
+    let (from, to) = (Cell::new(None), Cell::new(None));
+    let progress = |step: &str| match step {
+        "fitting the declared model" => from.set(Some(Instant::now())),
+        "measuring the held-out error" => to.set(Some(Instant::now())),
+        _ => {}
+    };
+    let options = Options { discover: false, progress: &progress };
+    black_box(identify(campaign, &options).expect("the paper's campaign has an answer"));
+    let (from, to): (Option<Instant>, Option<Instant>) = (from.get(), to.get());
+    to.expect("the fits end") - from.expect("the fits begin")
+}
+
 fn identification(criterion: &mut Criterion) {
     let plain: String = SCENARIO.lines().filter(|l| !l.contains("detection-cubic")).flat_map(|l| [l, "\n"]).collect();
     let mut group = criterion.benchmark_group("identify");
@@ -55,6 +72,11 @@ fn identification(criterion: &mut Criterion) {
             );
         });
     }
+    let folder = tempfile::tempdir().expect("the system has a folder for temporary files");
+    let campaign = simulate(&plain, folder.path());
+    group.bench_function("nothing to discover, the fits alone", |bencher| {
+        bencher.iter_custom(|times| (0..times).map(|_| fits(open(&campaign))).sum());
+    });
     group.finish();
 }
 

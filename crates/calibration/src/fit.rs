@@ -4,7 +4,7 @@
 //! to solve has only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
 //! much narrower than its prior an unknown became is how much the data told of it.
 
-use cvg_model::effects::Role as ParameterRole;
+use cvg_model::effects::{Role as ParameterRole, Stage};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -98,7 +98,7 @@ const WIDEST: f64 = 1e6;
 const DRIFT_RAD_S: f64 = 1e-3;
 /// A step is the last when after it no unknown is wrong by more than this share of its standard deviation.
 const CONVERGED: f64 = 0.02;
-/// A change of the angle by δ rad bends a residual by less than this times δ².
+/// A step that moves the angle by δ rad misses by less than this times δ, as a share of itself.
 const BEND: f64 = 10.0;
 
 /// Fits `hypothesis` to the segments of `role` of all tracks.
@@ -165,8 +165,11 @@ pub(crate) fn fit(
             result.covariance = covariance;
         }
         let deviation = |i: usize| result.covariance[(i, i)].max(0.0).sqrt();
-        // what the step moves, or what it leaves because the residuals are not straight
-        let left = |i: usize| step[i].abs().min(bend(&from.hypothesis, unknowns[i]) * step[i] * step[i]);
+        // what the step moves or, of unknowns that bend the residuals little, leaves
+        let left = |i: usize| {
+            let bent = if is_straight(&from.hypothesis, unknowns[i]) { BEND * from.moved(i, step[i]) } else { 1.0 };
+            step[i].abs() * bent.min(1.0)
+        };
         let small = (0..n).all(|i| left(i) <= CONVERGED * deviation(i) + f64::MIN_POSITIVE);
         best = Some(from);
         if last {
@@ -185,21 +188,17 @@ pub(crate) fn fit(
     result
 }
 
-/// By how much at most a step of an unknown misses the minimum, per square of the step.
-fn bend(hypothesis: &Hypothesis, unknown: Unknown) -> f64 {
+/// A change of this unknown bends the residuals as little as the angle that it moves: with it by δ rad, by some δ².
+fn is_straight(hypothesis: &Hypothesis, unknown: Unknown) -> bool {
     match unknown {
-        // the angle is a straight line of k, the amplitude of 1/τ
-        Unknown::AngularGain | Unknown::Damping => 0.0,
-        // multiplied by the drive's other unknowns
-        Unknown::ForceScale => 1.0 / hypothesis.force_scale.abs().max(f64::MIN_POSITIVE),
-        // the delay turns with the pattern, at some ten radians per second
-        Unknown::ControlLatency => BEND,
-        Unknown::Effect(i, p) => {
-            let parameters = hypothesis.members[i].id.description().parameters;
-            // a frequency is multiplied by the line's own size and by the length of the run
-            let located = parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_)));
-            // scales are those of a milliradian
-            if located { f64::INFINITY } else { BEND * 1e-3 / parameters[p].scale }
+        Unknown::AngularGain | Unknown::Damping => true,
+        // the drive's unknowns multiply one another
+        Unknown::ForceScale | Unknown::ControlLatency => false,
+        Unknown::Effect(i, _) => {
+            let d = hypothesis.members[i].id.description();
+            // and so do a frequency and its line; an onset has a corner
+            let located = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_)));
+            d.stage != Stage::Actuation && d.onsets.is_empty() && !located
         }
     }
 }
@@ -239,6 +238,12 @@ impl Linearised {
         }
         let (hypothesis, starts) = (at.hypothesis.clone(), at.starts.clone());
         Self { hypothesis, starts, sums, normal, right, chi2, prior_chi2, counted, set_aside }
+    }
+
+    /// rms of the angle (and of ln a, where that is fitted) that a step of one unknown moves, rad.
+    fn moved(&self, unknown: usize, step: f64) -> f64 {
+        let weight: f64 = self.sums.iter().flatten().map(|s| s.angle[0] + s.amplitude[0]).sum();
+        step.abs() * (self.normal[(unknown, unknown)] / weight.max(f64::MIN_POSITIVE)).sqrt()
     }
 
     fn mean_square(&self) -> f64 {
