@@ -6,7 +6,6 @@
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Stage, Values};
 use cvg_model::{AxisForces, Float};
 
-use crate::pi::within;
 use crate::{ConfigError, Status, positive};
 
 /// What the loops ask along the orbit, V: major (a) and minor (q) axis, in phase (c) and in quadrature (s).
@@ -135,7 +134,7 @@ impl<T: Float> Allocation<T> {
             Some(inverse) => inverse.apply(projected),
             None => projected,
         };
-        let fits = |f: T| within(f, self.limit_v);
+        let fits = |f: T| f.within(self.limit_v);
         if fits(asked.x_c) && fits(asked.x_s) && fits(asked.y_c) && fits(asked.y_s) {
             return Drive { volts: asked, status: Status::Within };
         }

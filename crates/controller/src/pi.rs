@@ -162,7 +162,7 @@ impl<T: Float> Pi<T> {
         let integral = state.integral + self.period_s * e;
         let asked = controller(self.gain, self.integration_time_s, e, integral);
         // false for any NaN
-        if within(asked, self.limit_v) && within(integral, self.integral_limit) {
+        if asked.within(self.limit_v) && integral.within(self.integral_limit) {
             state.integral = integral;
             return Command { volts: asked, status: Status::Within };
         }
@@ -177,7 +177,7 @@ impl<T: Float> Pi<T> {
         let held = state.integral.bounded(self.integral_limit);
         let integral = (held + self.period_s * e).bounded(self.integral_limit);
         let asked = command(e, integral);
-        if within(asked, self.limit_v) {
+        if asked.within(self.limit_v) {
             state.integral = integral;
             Command { volts: asked, status: Status::Within }
         } else if asked.magnitude() > self.limit_v {
@@ -189,12 +189,6 @@ impl<T: Float> Pi<T> {
             Command { volts: command(T::zero(), held).bounded(self.limit_v), status: Status::Invalid }
         }
     }
-}
-
-/// −`limit` ≤ `value` ≤ `limit`; false where either is not a number.
-#[inline]
-pub(crate) fn within<T: Float>(value: T, limit: T) -> bool {
-    value >= -limit && value <= limit
 }
 
 /// 2ζω_n T < 1: below it the sampled loop follows the continuous one.

@@ -277,11 +277,14 @@ impl<T: Float> Supervisor<T> {
                 return Orders::Run { hold: state.mode == Mode::Hold, ring_down: false };
             }
         }
-        self.otherwise(state, o, beat)
+        self.otherwise(state, *o, beat)
     }
 
+    /// What is seldom. The observation comes by value: what nobody else wants in memory is put there by this call alone.
+    #[cold]
     #[inline(never)]
-    fn otherwise(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
+    fn otherwise(&self, state: &mut SupervisorState, o: Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
+        let o = &o;
         if state.wish == Wish::Off {
             *state = SupervisorState { wish: Wish::Off, fault: state.fault, ..SupervisorState::default() };
             return Orders::Rest;

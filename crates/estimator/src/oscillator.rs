@@ -95,7 +95,7 @@ impl<T: Float> PhaseLock<T> {
         let detuning = state.detuning_rad_s + self.integral_gain_per_s * error;
         let rad_s = self.gain_per_s * error + detuning;
         // |L| ≤ E, so an error beyond ½ (with room for rounding) is no measurement; false for any NaN
-        if within(error, T::one()) && within(detuning, self.limit_rad_s) && within(rad_s, self.limit_rad_s) {
+        if error.within(T::one()) && detuning.within(self.limit_rad_s) && rad_s.within(self.limit_rad_s) {
             state.detuning_rad_s = detuning;
             return Correction { rad_s, status: Status::Valid };
         }
@@ -107,7 +107,7 @@ impl<T: Float> PhaseLock<T> {
     #[inline(never)]
     fn beyond(&self, state: &mut LockState<T>, p: &Pendulum<T>, error: T) -> Correction<T> {
         let held = state.detuning_rad_s.bounded(self.limit_rad_s);
-        if within(error, T::one()) {
+        if error.within(T::one()) {
             state.detuning_rad_s = (held + self.integral_gain_per_s * error).bounded(self.limit_rad_s);
             let rad_s = (self.gain_per_s * error + state.detuning_rad_s).bounded(self.limit_rad_s);
             Correction { rad_s, status: Status::Valid }
@@ -117,10 +117,4 @@ impl<T: Float> PhaseLock<T> {
             Correction { rad_s: held, status }
         }
     }
-}
-
-/// −`limit` ≤ `value` ≤ `limit`; false where either is not a number.
-#[inline]
-fn within<T: Float>(value: T, limit: T) -> bool {
-    value >= -limit && value <= limit
 }

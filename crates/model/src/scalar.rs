@@ -98,15 +98,26 @@ pub trait Float: Real {
     /// `limit` is negative: a bound that holds for every bit pattern.
     #[inline]
     fn bounded(self, limit: Self) -> Self {
-        if self >= -limit && self <= limit {
-            self
-        } else if limit >= Self::zero() && self > limit {
-            limit
-        } else if limit >= Self::zero() && self < -limit {
-            -limit
-        } else {
-            Self::zero()
-        }
+        if self.within(limit) { self } else { nearer_end(self, limit) }
+    }
+
+    /// −`limit` ≤ `self` ≤ `limit`; false where either is NaN or `limit` is negative.
+    #[inline(always)]
+    fn within(self, limit: Self) -> bool {
+        self.magnitude() <= limit
+    }
+}
+
+/// The end of [−`limit`, `limit`] that `value`, which is not in it, is beyond; 0 where there is none.
+#[cold]
+#[inline(never)]
+fn nearer_end<T: Float>(value: T, limit: T) -> T {
+    if limit >= T::zero() && value > limit {
+        limit
+    } else if limit >= T::zero() && value < -limit {
+        -limit
+    } else {
+        T::zero()
     }
 }
 
