@@ -64,6 +64,10 @@ impl Real for Single {
     fn atan2(self, x: Self) -> Self {
         Self(Real::atan2(self.0, x.0))
     }
+    #[inline(always)]
+    fn epsilon() -> Self {
+        Self(f32::EPSILON)
+    }
 }
 
 impl Float for Single {

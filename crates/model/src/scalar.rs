@@ -38,6 +38,12 @@ pub trait Real:
     /// The angle of the point (`x`, `self`) in radians, in (−π, π]; 0 for the origin.
     fn atan2(self, x: Self) -> Self;
 
+    /// The distance from 1 to the next larger number; 0 for a scalar that does not round.
+    #[inline]
+    fn epsilon() -> Self {
+        Self::zero()
+    }
+
     /// 0
     #[inline]
     fn zero() -> Self {
@@ -139,6 +145,10 @@ macro_rules! machine_float {
             #[inline]
             fn atan2(self, x: Self) -> Self {
                 $atan2(self, x)
+            }
+            #[inline]
+            fn epsilon() -> Self {
+                $t::EPSILON
             }
         }
         impl Float for $t {
