@@ -89,7 +89,7 @@ impl<T: Float> Instrument<T> {
             None => readout,
             Some(inverse) => match inverse.apply_at_any_moment(readout) {
                 Some(vibration) => vibration,
-                None => return self.last_at_its_moment(state, inverse, readout, cos, sin),
+                None => return self.last_at_its_moment(state, inverse, cos, sin),
             },
         };
         self.go_on(state, vibration, cos, sin)
@@ -118,11 +118,10 @@ impl<T: Float> Instrument<T> {
         &self,
         state: &mut State<T>,
         inverse: &Compensation<T, MOST_COMPENSATED>,
-        readout: Envelope<T>,
         cos: T,
         sin: T,
     ) -> (T, T, Status) {
-        let vibration = inverse.apply(readout, &self.moment(state));
+        let vibration = inverse.apply(state.seen.readout, &self.moment(state));
         self.go_on(state, vibration, cos, sin)
     }
 
@@ -133,7 +132,7 @@ impl<T: Float> Instrument<T> {
         let p = vibration.pendulum();
         if self.supervisor.goes_on(&state.supervisor, &p) {
             if state.supervisor.mode == Mode::Hold {
-                return self.go_on_held(state, vibration, p, cos, sin);
+                return self.go_on_held(state, cos, sin);
             }
             if let Some(out) = self.steadily::<false>(state, &vibration, &p, cos, sin) {
                 return out;
@@ -143,8 +142,9 @@ impl<T: Float> Instrument<T> {
     }
 
     #[inline(never)]
-    fn go_on_held(&self, state: &mut State<T>, e: Envelope<T>, p: Pendulum<T>, cos: T, sin: T) -> (T, T, Status) {
-        match self.steadily::<true>(state, &e, &p, cos, sin) {
+    fn go_on_held(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
+        let e = state.seen.compensated;
+        match self.steadily::<true>(state, &e, &e.pendulum(), cos, sin) {
             Some(out) => out,
             None => self.otherwise(state, Suspicion::default(), cos, sin),
         }
