@@ -53,13 +53,12 @@ static inline double pi(double *integral, double gain, double time, double perio
 static __attribute__((noinline)) void control(const config *k, state *s) {
     // the window's least-squares fit
     double n = k->samples, c0 = s->start_c, s0 = s->start_s, c1 = s->c, s1 = s->s, cw = s->step_c, sw = s->step_s;
-    double dc = c1 - c0, ds = s1 - s0, single = 1.0 / (2.0 * (1.0 - cw));
-    double sum_c = (dc * (cw - 1.0) + ds * sw) * single, sum_s = (ds * (cw - 1.0) - dc * sw) * single;
-    double d2c = c1 * c1 - s1 * s1 - (c0 * c0 - s0 * s0), d2s = 2.0 * (c1 * s1 - c0 * s0), twice = 1.0 / (2.0 * sw);
-    double sum_2c = (d2s * cw - d2c * sw) * twice, sum_2s = -(d2c * cw + d2s * sw) * twice;
-    double mean_c = sum_c / n, mean_s = sum_s / n;
-    double cc = 0.5 * n + 0.5 * sum_2c - sum_c * mean_c, ss = 0.5 * n - 0.5 * sum_2c - sum_s * mean_s;
-    double cs = 0.5 * sum_2s - sum_c * mean_s, inverse = 1.0 / (cc * ss - cs * cs);
+    double cosecant = 1.0 / sw, cot = cw * cosecant, cot_half = cot + cosecant;
+    double dc = c1 - c0, ds = s1 - s0, sum_c = cot_half * ds - dc, sum_s = -(cot_half * dc + ds);
+    double d2c = s1 * s1 - s0 * s0, d2s = c1 * s1 - c0 * s0, sum_2c = d2c + cot * d2s, sum_2s = cot * d2c - d2s;
+    double per_two = 0.5 / n, mean_c = sum_c * per_two, mean_s = sum_s * per_two;
+    double cc = n + sum_2c - sum_c * mean_c, ss = n - sum_2c - sum_s * mean_s;
+    double cs = sum_2s - sum_c * mean_s, inverse = 2.0 / (cc * ss - cs * cs);
     double ic = cc * inverse, is = ss * inverse, ix = cs * inverse;
     double a = s->xc - s->sx * mean_c, b = s->xs - s->sx * mean_s;
     double xc = is * a - ix * b, xs = ic * b - ix * a;
@@ -94,9 +93,9 @@ static __attribute__((noinline)) void control(const config *k, state *s) {
         double error = -(0.5 * l / e);
         s->detuning = bounded(s->detuning + k->phase_integral * error, k->correction_limit);
         correction = bounded(k->phase_gain * error + s->detuning, k->correction_limit);
-        double dir_c = r < 0.0 ? t : line + r, dir_s = r < 0.0 ? line - r : t;
+        double wide = 1.0 + fabs(cos_2), dir_c = cos_2 < 0.0 ? sin_2 : wide, dir_s = cos_2 < 0.0 ? wide : sin_2;
         double in_phase = dir_c * xc + dir_s * yc;
-        double unit = 1.0 / sqrt(2.0 * line * (line + fabs(r)));
+        double unit = 1.0 / sqrt(wide * wide + sin_2 * sin_2);
         if (in_phase < 0.0) unit = -unit;
         dir_c *= unit, dir_s *= unit;
         double psi = 0.5 * s->per_window * k->lead, length = 1.0 - 0.5 * psi * psi;

@@ -43,13 +43,13 @@ impl Real for Single {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let mut bits = self.0.to_bits();
-        // stable Rust has no floating-point registers in assembly for this target: one is borrowed and given back
+        // stable Rust hands no floating-point register to assembly for this target, but takes it that one is changed
         // SAFETY: changes nothing but the two registers that it names, and the flags of inexactness, which nobody reads
         unsafe {
             asm!(
-                "vmov {kept}, s0", "vmov s0, {bits}", "vsqrt.f32 s0, s0", "vmov {bits}, s0", "vmov s0, {kept}",
-                kept = out(reg) _,
+                "vmov s0, {bits}", "vsqrt.f32 s0, s0", "vmov {bits}, s0",
                 bits = inout(reg) bits,
+                out("s0") _,
                 options(pure, nomem, nostack, preserves_flags)
             );
         }
@@ -63,6 +63,10 @@ impl Real for Single {
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         Self(Real::atan2(self.0, x.0))
+    }
+    #[inline(always)]
+    fn epsilon() -> Self {
+        Self(f32::EPSILON)
     }
 }
 

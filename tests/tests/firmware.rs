@@ -33,6 +33,12 @@ fn the_documented_instruction_counts_are_those_of_the_baseline() {
 }
 
 #[test]
+fn a_control_step_with_compensation_takes_at_most_five_hundred_instructions() {
+    let count: f64 = baseline()["compensated control"].parse().expect("a number");
+    assert!(count <= 500.0, "{count}");
+}
+
+#[test]
 fn a_pair_of_samples_takes_at_most_eighty_instructions() {
     for recording in ["plain", "compensated"] {
         let count: f64 = baseline()[&format!("{recording} sample")].parse().expect("a number");

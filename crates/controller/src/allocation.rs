@@ -4,9 +4,8 @@
 //! It refuses to find the direction: it takes its cosine and sine.
 
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Stage, Values};
-use cvg_model::{AxisForces, Float};
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float};
 
-use crate::pi::within;
 use crate::{ConfigError, Status, positive};
 
 /// What the loops ask along the orbit, V: major (a) and minor (q) axis, in phase (c) and in quadrature (s).
@@ -125,30 +124,65 @@ impl<T: Float> Allocation<T> {
     /// Total: a channel that is asked for more than the limit gets the limit, for no number gets 0.
     #[inline]
     pub fn step(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> Drive<T> {
+        let asked = self.asked(v, cos, sin);
+        if self.fits(&asked) { Drive { volts: asked, status: Status::Within } } else { self.limited(asked) }
+    }
+
+    /// [`Allocation::step`] where no channel is near its limit: the volts. None elsewhere.
+    #[inline(always)]
+    pub fn step_within(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> Option<AxisForces<T>> {
+        let asked = self.asked(v, cos, sin);
+        if self.fits(&asked) { Some(asked) } else { None }
+    }
+
+    /// The same for the energy and the quadrature loop alone, which is **Equation 9**.
+    #[inline(always)]
+    pub fn axes_within(&self, v: &ControlOutputs<T>, cos: T, sin: T) -> Option<AxisForces<T>> {
+        let unit = ActuationGains { x: T::one(), y: T::one() };
+        let asked = self.compensated(unit.axis_forces_along(v, cos, sin));
+        if self.fits(&asked) { Some(asked) } else { None }
+    }
+
+    /// The sum is within the limit; so is each. False for any NaN.
+    #[inline(always)]
+    fn fits(&self, f: &AxisForces<T>) -> bool {
+        f.x_c.magnitude() + f.x_s.magnitude() + f.y_c.magnitude() + f.y_s.magnitude() <= self.limit_v
+    }
+
+    /// What is asked of the drives.
+    #[inline(always)]
+    fn asked(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> AxisForces<T> {
         let projected = AxisForces {
             x_c: v.v_ac * cos - v.v_qc * sin,
             x_s: v.v_as * cos - v.v_qs * sin,
             y_c: v.v_qc * cos + v.v_ac * sin,
             y_s: v.v_as * sin + v.v_qs * cos,
         };
-        let asked = match &self.compensation {
-            Some(inverse) => inverse.apply(projected),
-            None => projected,
+        self.compensated(projected)
+    }
+
+    #[inline(always)]
+    fn compensated(&self, forces: AxisForces<T>) -> AxisForces<T> {
+        match &self.compensation {
+            Some(inverse) => inverse.apply(forces),
+            None => forces,
+        }
+    }
+
+    /// The drives' commands where the channels together ask for more than the limit of one.
+    #[cold]
+    #[inline(never)]
+    fn limited(&self, asked: AxisForces<T>) -> Drive<T> {
+        let channels = [asked.x_c, asked.x_s, asked.y_c, asked.y_s];
+        let status = if channels.iter().all(|f| f.within(self.limit_v)) {
+            Status::Within
+        } else if channels.iter().all(|f| f.is_finite()) {
+            Status::Limited
+        } else {
+            Status::Invalid
         };
-        let fits = |f: T| within(f, self.limit_v);
-        if fits(asked.x_c) && fits(asked.x_s) && fits(asked.y_c) && fits(asked.y_s) {
-            return Drive { volts: asked, status: Status::Within };
-        }
-        let finite = asked.x_c.is_finite() && asked.x_s.is_finite() && asked.y_c.is_finite() && asked.y_s.is_finite();
-        Drive {
-            volts: AxisForces {
-                x_c: asked.x_c.bounded(self.limit_v),
-                x_s: asked.x_s.bounded(self.limit_v),
-                y_c: asked.y_c.bounded(self.limit_v),
-                y_s: asked.y_s.bounded(self.limit_v),
-            },
-            status: if finite { Status::Limited } else { Status::Invalid },
-        }
+        let [x_c, x_s, y_c, y_s] = channels.map(|f| f.bounded(self.limit_v));
+        Drive { volts: AxisForces { x_c, x_s, y_c, y_s }, status }
     }
 }
 

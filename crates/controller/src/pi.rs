@@ -126,6 +126,18 @@ impl<T: Float> Pi<T> {
         PiState { integral: (self.integral_limit * (volts / self.limit_v)).bounded(self.integral_limit) }
     }
 
+    /// [`Pi::energy`] where nothing is at a limit: the volts. None, and nothing changed, elsewhere.
+    #[inline(always)]
+    pub fn energy_within(&self, state: &mut PiState<T>, e_d: T, e_0: T) -> Option<T> {
+        self.step_within(state, e_d - e_0, energy_control)
+    }
+
+    /// [`Pi::quadrature`] where nothing is at a limit: the volts. None, and nothing changed, elsewhere.
+    #[inline(always)]
+    pub fn quadrature_within(&self, state: &mut PiState<T>, q_d: T) -> Option<T> {
+        self.step_within(state, q_d, quadrature_control)
+    }
+
     /// The energy controller's command v_as for measured energy `e_d` and set point `e_0`, V².
     #[inline]
     pub fn energy(&self, state: &mut PiState<T>, e_d: T, e_0: T) -> Command<T> {
@@ -159,14 +171,23 @@ impl<T: Float> Pi<T> {
     /// integral part alone.
     #[inline]
     fn step(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T) -> Command<T> {
+        match self.step_within(state, e, &controller) {
+            Some(volts) => Command { volts, status: Status::Within },
+            None => self.beyond(state, e, controller),
+        }
+    }
+
+    /// The step where command and integral stay within their limits.
+    #[inline(always)]
+    fn step_within(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T) -> Option<T> {
         let integral = state.integral + self.period_s * e;
         let asked = controller(self.gain, self.integration_time_s, e, integral);
         // false for any NaN
-        if within(asked, self.limit_v) && within(integral, self.integral_limit) {
+        if asked.within(self.limit_v) && integral.within(self.integral_limit) {
             state.integral = integral;
-            return Command { volts: asked, status: Status::Within };
+            return Some(asked);
         }
-        self.beyond(state, e, controller)
+        None
     }
 
     /// The step where the command or the integral does not stay within its limit, or something is not a number.
@@ -177,7 +198,7 @@ impl<T: Float> Pi<T> {
         let held = state.integral.bounded(self.integral_limit);
         let integral = (held + self.period_s * e).bounded(self.integral_limit);
         let asked = command(e, integral);
-        if within(asked, self.limit_v) {
+        if asked.within(self.limit_v) {
             state.integral = integral;
             Command { volts: asked, status: Status::Within }
         } else if asked.magnitude() > self.limit_v {
@@ -189,12 +210,6 @@ impl<T: Float> Pi<T> {
             Command { volts: command(T::zero(), held).bounded(self.limit_v), status: Status::Invalid }
         }
     }
-}
-
-/// −`limit` ≤ `value` ≤ `limit`; false where either is not a number.
-#[inline]
-pub(crate) fn within<T: Float>(value: T, limit: T) -> bool {
-    value >= -limit && value <= limit
 }
 
 /// 2ζω_n T < 1: below it the sampled loop follows the continuous one.

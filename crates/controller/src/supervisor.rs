@@ -155,6 +155,9 @@ pub struct SupervisorSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supervisor<T> {
     pub(crate) set_2: T,
+    /// a quarter and nine quarters of it: half and one and a half times the amplitude
+    pub(crate) low_2: T,
+    pub(crate) high_2: T,
     pub(crate) heard_2: T,
     pub(crate) band_rad_s: T,
     pub(crate) sweep: u32,
@@ -238,6 +241,8 @@ impl<T: Float> Supervisor<T> {
         };
         Ok(Self {
             set_2: T::from_f64(s.amplitude_v * s.amplitude_v),
+            low_2: T::from_f64(0.25 * s.amplitude_v * s.amplitude_v),
+            high_2: T::from_f64(2.25 * s.amplitude_v * s.amplitude_v),
             heard_2: T::from_f64(s.heard_v * s.heard_v),
             band_rad_s: T::from_f64(s.band_rad_s),
             sweep: windows(s.sweep_s, "sweep_s")?,
@@ -258,30 +263,19 @@ impl<T: Float> Supervisor<T> {
     //= specs/dsp.md#recovery
     //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
     /// The orders for the window to come, after the window `o`. Total.
-    #[inline]
     pub fn step(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
-        state.windows = state.windows.saturating_add(1);
-        // the way of nearly every window
-        let running = matches!(state.mode, Mode::WholeAngle | Mode::Hold);
-        if running && o.valid && !(o.clipped || o.repeats || o.jumped) && state.wish == Wish::of(state.mode) {
-            let p = &o.pendulum;
-            let (low, high) = (T::ratio(1, 4) * self.set_2, T::ratio(9, 4) * self.set_2);
-            let bound = T::half() * p.e;
-            if p.e > low && p.e < high && p.q.magnitude() < bound && p.l.magnitude() < bound {
-                state.bad = state.bad.saturating_sub(1);
-                state.repeats = 0;
-                state.clipped = state.clipped.saturating_sub(1);
-                if state.windows >= self.forget {
-                    (state.starts, state.coasts, state.cause) = (0, 0, None);
-                }
-                return Orders::Run { hold: state.mode == Mode::Hold, ring_down: false };
+        state.count();
+        let running = matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.wish == Wish::of(state.mode);
+        let well = o.valid && !(o.clipped || o.repeats || o.jumped);
+        if running && well && self.within_bounds(&o.pendulum) {
+            state.bad = state.bad.saturating_sub(1);
+            state.repeats = 0;
+            state.clipped = state.clipped.saturating_sub(1);
+            if state.windows >= self.forget {
+                (state.starts, state.coasts, state.cause) = (0, 0, None);
             }
+            return Orders::Run { hold: state.mode == Mode::Hold, ring_down: false };
         }
-        self.otherwise(state, o, beat)
-    }
-
-    #[inline(never)]
-    fn otherwise(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
         if state.wish == Wish::Off {
             *state = SupervisorState { wish: Wish::Off, fault: state.fault, ..SupervisorState::default() };
             return Orders::Rest;
@@ -309,6 +303,32 @@ impl<T: Float> Supervisor<T> {
             Mode::Coast => self.coast(state, o),
             Mode::Fault => Orders::Rest,
         }
+    }
+
+    /// Whether all that [`Supervisor::step`] does after a window with the pendulum variables `p`, of which nothing else is
+    /// amiss, is to [count](SupervisorState::count) it: whole angle or hold goes on as it is.
+    #[inline(always)]
+    pub fn goes_on(&self, state: &SupervisorState, p: &Pendulum<T>) -> bool {
+        let as_wished = match state.mode {
+            Mode::WholeAngle => state.wish == Wish::WholeAngle,
+            Mode::Hold => state.wish == Wish::Hold,
+            _ => false,
+        };
+        // one branch for all three
+        let counted = state.bad | state.repeats | state.clipped;
+        as_wished
+            && counted == 0
+            && (state.windows.saturating_add(1) < self.forget || state.forgotten())
+            && p.e > self.low_2
+            && p.e < self.high_2
+            // together below the bound that each has
+            && p.q.magnitude() + p.l.magnitude() < T::half() * p.e
+    }
+
+    /// Amplitude, quadrature and phase are those of an instrument in operation.
+    fn within_bounds(&self, p: &Pendulum<T>) -> bool {
+        let bound = T::half() * p.e;
+        p.e > self.low_2 && p.e < self.high_2 && p.q.magnitude() < bound && p.l.magnitude() < bound
     }
 
     fn listen(&self, state: &mut SupervisorState, beat: Option<Beat<T>>) -> Orders<T> {
@@ -417,7 +437,7 @@ impl<T: Float> Supervisor<T> {
             Wish::RingDown => Mode::RingDown,
             Wish::WholeAngle | Wish::Off => Mode::WholeAngle,
         };
-        let low = p.e < T::ratio(1, 4) * self.set_2;
+        let low = p.e < self.low_2;
         if wished != state.mode {
             // after a ring-down the amplitude has to come back first
             let next = if low { Mode::SpinUp } else { wished };
@@ -441,7 +461,7 @@ impl<T: Float> Supervisor<T> {
         if p.l.magnitude() >= bound {
             return Some(enter(state, Mode::Lock, Orders::Snap));
         }
-        let high = p.e > T::ratio(9, 4) * self.set_2;
+        let high = p.e > self.high_2;
         let round = p.q.magnitude() >= bound;
         if high || round {
             state.bad = state.bad.saturating_add(1);
@@ -487,6 +507,18 @@ impl<T: Float> Supervisor<T> {
 }
 
 impl SupervisorState {
+    /// Counts a window.
+    #[inline(always)]
+    pub fn count(&mut self) {
+        self.windows = self.windows.saturating_add(1);
+    }
+
+    /// Nothing is left of earlier starts.
+    #[inline(always)]
+    fn forgotten(&self) -> bool {
+        self.starts | self.coasts == 0 && self.cause.is_none()
+    }
+
     /// The fault it is in.
     #[inline]
     pub fn fault_now(&self) -> Option<Fault> {

@@ -7,7 +7,8 @@
 //! are differences of the phasor at the window's two ends,
 //!
 //! $$\sum_{k=0}^{N-1} e^{i\varphi_k} = \frac{e^{i\varphi_N}-e^{i\varphi_0}}{e^{iw}-1},\qquad
-//!   \sum_{k=0}^{N-1} e^{2i\varphi_k} = \frac{e^{2i\varphi_N}-e^{2i\varphi_0}}{e^{2iw}-1}.$$
+//!   \sum_{k=0}^{N-1} e^{2i\varphi_k} = \frac{e^{2i\varphi_N}-e^{2i\varphi_0}}{e^{2iw}-1},\qquad
+//!   \frac{1}{e^{2iw}-1} = -\tfrac12(1+i\cot w).$$
 //!
 //! The envelope is that of the window's middle: the group delay is (N − 1)/2 samples, whatever N.
 //!
@@ -22,9 +23,11 @@ use crate::{ConfigError, Status};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demodulator<T> {
     samples: u32,
-    per_sample: T,
-    half_samples: T,
+    all_samples: T,
+    per_two_samples: T,
     full_scale_v: T,
+    /// an envelope beyond this is none
+    most_v: T,
     clip_v: T,
 }
 
@@ -54,7 +57,7 @@ pub struct Window<T> {
 pub struct Measurement<T> {
     /// the envelope at the window's middle
     pub envelope: Envelope<T>,
-    /// Σx and Σy: with the last samples, what tells a converter that repeats itself
+    /// [`Window::fingerprint`]
     pub fingerprint: [T; 4],
     /// whether the envelope was measured
     pub status: Status,
@@ -79,6 +82,12 @@ impl<T: Float> Window<T> {
             clipped: 0,
         }
     }
+
+    /// Σx and Σy, and the last samples: what tells a converter that repeats itself.
+    #[inline(always)]
+    pub fn fingerprint(&self) -> [T; 4] {
+        [self.x, self.y, self.last.0, self.last.1]
+    }
 }
 
 impl<T: Float> Demodulator<T> {
@@ -96,9 +105,10 @@ impl<T: Float> Demodulator<T> {
         }
         Ok(Self {
             samples: u32::from(samples),
-            per_sample: T::from_f64(1.0 / f64::from(samples)),
-            half_samples: T::from_f64(0.5 * f64::from(samples)),
+            all_samples: T::from_f64(f64::from(samples)),
+            per_two_samples: T::from_f64(0.5 / f64::from(samples)),
             full_scale_v: T::from_f64(full_scale_v),
+            most_v: T::from_f64(8.0 * full_scale_v),
             clip_v: T::from_f64(full_scale_v * (1.0 - 1e-4)),
         })
     }
@@ -155,7 +165,9 @@ impl<T: Float> Demodulator<T> {
                 T::zero()
             } else if v.magnitude() >= self.clip_v {
                 window.clipped = window.clipped.saturating_add(1);
-                v.bounded(self.full_scale_v)
+                // a number, and not a small one: an end of the range, or short of it
+                let end = if v < T::zero() { -self.full_scale_v } else { self.full_scale_v };
+                if v.within(self.full_scale_v) { v } else { end }
             } else {
                 v
             }
@@ -169,35 +181,38 @@ impl<T: Float> Demodulator<T> {
     //# An envelope that changes evenly MUST be measured as it is at the middle of its window.
     /// The envelope of a full window that ends where `end` begins, one sample after its last, with the step that was
     /// in use in it.
-    #[inline]
     pub fn finish(&self, window: &Window<T>, end: &Phasor<T>) -> Measurement<T> {
-        let fingerprint = [window.x, window.y, window.last.0, window.last.1];
-        let (invalid, clipped) = (window.invalid, window.clipped);
-        let none = |status| Measurement { envelope: Envelope::zero(), fingerprint, status, invalid, clipped };
-        if invalid > 0 {
-            return none(Status::Invalid);
+        let (fingerprint, invalid, clipped) = (window.fingerprint(), window.invalid, window.clipped);
+        let (envelope, status) = match self.envelope(window, end) {
+            Some(envelope) => (envelope, Status::Valid),
+            None => (Envelope::zero(), Status::Invalid),
+        };
+        Measurement { envelope, fingerprint, status, invalid, clipped }
+    }
+
+    /// The envelope of [`Demodulator::finish`], if the window has one.
+    #[inline(always)]
+    pub fn envelope(&self, window: &Window<T>, end: &Phasor<T>) -> Option<Envelope<T>> {
+        if window.invalid > 0 {
+            return None;
         }
         let (c0, s0) = window.start;
         let (c1, s1) = (end.cos, end.sin);
-        let (cw, sw) = (end.step_cos, end.step_sin);
-        let (one, two) = (T::one(), T::two());
-        // Σe^{iφ}: conjugate of the denominator over its square, |e^{iw} − 1|² = 2(1 − cos w)
+        let cosecant = T::one() / end.step_sin;
+        let cot = end.step_cos * cosecant;
+        let cot_half = cot + cosecant;
+        // twice Σe^{iφ} = −(1 + i cot w/2)(e^{iφ_N} − e^{iφ_0})
         let (dc, ds) = (c1 - c0, s1 - s0);
-        let single = one / (two * (one - cw));
-        let sum_c = (dc * (cw - one) + ds * sw) * single;
-        let sum_s = (ds * (cw - one) - dc * sw) * single;
-        // Σe^{2iφ}: e^{2iw} − 1 = 2i sin w e^{iw}
-        let (dc, ds) = (c1 * c1 - s1 * s1 - (c0 * c0 - s0 * s0), two * (c1 * s1 - c0 * s0));
-        let double = one / (two * sw);
-        let sum_2c = (ds * cw - dc * sw) * double;
-        let sum_2s = -(dc * cw + ds * sw) * double;
-        // normal equations, the offset eliminated
-        let (mean_c, mean_s) = (sum_c * self.per_sample, sum_s * self.per_sample);
-        let half = T::half();
-        let cc = self.half_samples + half * sum_2c - sum_c * mean_c;
-        let ss = self.half_samples - half * sum_2c - sum_s * mean_s;
-        let cs = half * sum_2s - sum_c * mean_s;
-        let inverse = one / (cc * ss - cs * cs);
+        let (sum_c, sum_s) = (cot_half * ds - dc, -(cot_half * dc + ds));
+        // Σe^{2iφ}, the phasors being of length one
+        let (a, b) = (s1 * s1 - s0 * s0, c1 * s1 - c0 * s0);
+        let (sum_2c, sum_2s) = (a + cot * b, cot * a - b);
+        // twice the normal equations, the offset eliminated
+        let (mean_c, mean_s) = (sum_c * self.per_two_samples, sum_s * self.per_two_samples);
+        let cc = self.all_samples + sum_2c - sum_c * mean_c;
+        let ss = self.all_samples - sum_2c - sum_s * mean_s;
+        let cs = sum_2s - sum_c * mean_s;
+        let inverse = T::two() / (cc * ss - cs * cs);
         let (ic, is, ix) = (cc * inverse, ss * inverse, cs * inverse);
         let solve = |c: T, s: T, sum: T| {
             let (c, s) = (c - sum * mean_c, s - sum * mean_s);
@@ -207,11 +222,6 @@ impl<T: Float> Demodulator<T> {
         let (y_c, y_s) = solve(window.mixed.y_c, window.mixed.y_s, window.y);
         // the sum is a number only if all four are, and none is far out of range
         let size = x_c.magnitude() + x_s.magnitude() + y_c.magnitude() + y_s.magnitude();
-        if size < T::ratio(8, 1) * self.full_scale_v {
-            let envelope = Envelope::new(x_c, x_s, y_c, y_s);
-            Measurement { envelope, fingerprint, status: Status::Valid, invalid, clipped }
-        } else {
-            none(Status::Invalid)
-        }
+        if size < self.most_v { Some(Envelope::new(x_c, x_s, y_c, y_s)) } else { None }
     }
 }

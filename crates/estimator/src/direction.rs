@@ -56,6 +56,29 @@ pub fn major_axis<T: Float>(e: &Envelope<T>, p: &Pendulum<T>) -> Direction<T> {
     }
 }
 
+/// [`major_axis`] from cos 2θ and sin 2θ, which a tracker of the pattern has already, for one square root:
+///
+/// $$(\cos\theta, \sin\theta) = \pm\frac{(1+\cos 2\theta,\ \sin 2\theta)}{\sqrt{2(1+\cos 2\theta)}}\quad (\cos 2\theta\ge0),\qquad
+///   \pm\frac{(\sin 2\theta,\ 1-\cos 2\theta)}{\sqrt{2(1-\cos 2\theta)}}\quad (\cos 2\theta<0).$$
+///
+/// Domain: a unit vector (`cos_2`, `sin_2`) and an in-phase vibration along the major axis; elsewhere as [`major_axis`],
+/// also for the origin.
+#[inline(always)]
+pub fn major_axis_of<T: Float>(e: &Envelope<T>, cos_2: T, sin_2: T) -> Direction<T> {
+    let wide = T::one() + cos_2.magnitude();
+    let (cos, sin) = if cos_2 < T::zero() { (sin_2, wide) } else { (wide, sin_2) };
+    let in_phase = cos * e.x_c + sin * e.y_c;
+    let length_2 = wide * wide + sin_2 * sin_2;
+    // at least 1; false for NaN
+    if length_2 <= T::ratio(8, 1) && in_phase * in_phase > T::zero() {
+        let scale = if in_phase < T::zero() { -T::one() } else { T::one() } / length_2.sqrt();
+        Direction { cos: cos * scale, sin: sin * scale, status: Status::Valid }
+    } else {
+        let status = if length_2.is_finite() { Status::Undetermined } else { Status::Invalid };
+        Direction { cos: T::one(), sin: T::zero(), status }
+    }
+}
+
 impl<T: Real> Direction<T> {
     /// θ_d over the full turn, in (−π, π], rad.
     #[inline]

@@ -99,20 +99,45 @@ impl<T: Float> Oscillator<T> {
     /// no sensible length starts anew.
     #[inline]
     pub fn tune(&self, phasor: &Phasor<T>, correction_rad_s: T) -> Phasor<T> {
-        let u = correction_rad_s.bounded(self.limit_rad_s) * self.period_s;
+        match self.tune_within(phasor, correction_rad_s) {
+            Some(tuned) => tuned,
+            None => self.tune_beyond(phasor, correction_rad_s),
+        }
+    }
+
+    /// [`Oscillator::tune`] where the correction is within its limit and the phasor's length is near one. None elsewhere.
+    #[inline(always)]
+    pub fn tune_within(&self, phasor: &Phasor<T>, correction_rad_s: T) -> Option<Phasor<T>> {
+        let length_2 = phasor.cos * phasor.cos + phasor.sin * phasor.sin;
+        // false for any NaN
+        if correction_rad_s.within(self.limit_rad_s) && (length_2 - T::one()).within(T::ratio(1, 4)) {
+            let (step_cos, step_sin) = self.step(correction_rad_s);
+            // one step of Newton's iteration towards length 1
+            let scale = T::ratio(3, 2) - T::half() * length_2;
+            Some(Phasor { cos: phasor.cos * scale, sin: phasor.sin * scale, step_cos, step_sin })
+        } else {
+            None
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn tune_beyond(&self, phasor: &Phasor<T>, correction_rad_s: T) -> Phasor<T> {
+        let within = correction_rad_s.bounded(self.limit_rad_s);
+        self.tune_within(phasor, within).unwrap_or_else(|| {
+            let (step_cos, step_sin) = self.step(within);
+            Phasor { cos: T::one(), sin: T::zero(), step_cos, step_sin }
+        })
+    }
+
+    /// Cosine and sine of the phase step at a correction within the limit.
+    #[inline(always)]
+    fn step(&self, correction_rad_s: T) -> (T, T) {
+        let u = correction_rad_s * self.period_s;
         let u2 = u * u;
         let sin = u * (T::one() - u2 * (T::ratio(1, 6) - u2 * T::ratio(1, 120)));
         let cos = T::one() - u2 * (T::half() - u2 * (T::ratio(1, 24) - u2 * T::ratio(1, 720)));
-        let step_cos = self.centre_cos * cos - self.centre_sin * sin;
-        let step_sin = self.centre_sin * cos + self.centre_cos * sin;
-        let length_2 = phasor.cos * phasor.cos + phasor.sin * phasor.sin;
-        // one step of Newton's iteration towards length 1; false for NaN
-        if length_2 > T::ratio(3, 4) && length_2 < T::ratio(5, 4) {
-            let scale = T::ratio(3, 2) - T::half() * length_2;
-            Phasor { cos: phasor.cos * scale, sin: phasor.sin * scale, step_cos, step_sin }
-        } else {
-            Phasor { cos: T::one(), sin: T::zero(), step_cos, step_sin }
-        }
+        (self.centre_cos * cos - self.centre_sin * sin, self.centre_sin * cos + self.centre_cos * sin)
     }
 
     /// The largest correction, rad/s.

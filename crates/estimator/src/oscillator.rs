@@ -91,23 +91,33 @@ impl<T: Float> PhaseLock<T> {
     /// The correction for the pendulum variables `p`. Total; holds the integral where there is no phase to measure.
     #[inline]
     pub fn step(&self, state: &mut LockState<T>, p: &Pendulum<T>) -> Correction<T> {
-        let error = -(T::half() * p.l / p.e);
+        match self.step_within(state, p) {
+            Some(rad_s) => Correction { rad_s, status: Status::Valid },
+            None => self.beyond(state, p),
+        }
+    }
+
+    /// [`PhaseLock::step`] where nothing is at a limit: the correction, rad/s. None, and nothing changed, elsewhere.
+    #[inline(always)]
+    pub fn step_within(&self, state: &mut LockState<T>, p: &Pendulum<T>) -> Option<T> {
+        let error = phase_error(p);
         let detuning = state.detuning_rad_s + self.integral_gain_per_s * error;
         let rad_s = self.gain_per_s * error + detuning;
         // |L| ≤ E, so an error beyond ½ (with room for rounding) is no measurement; false for any NaN
-        if within(error, T::one()) && within(detuning, self.limit_rad_s) && within(rad_s, self.limit_rad_s) {
+        if error.within(T::one()) && detuning.within(self.limit_rad_s) && rad_s.within(self.limit_rad_s) {
             state.detuning_rad_s = detuning;
-            return Correction { rad_s, status: Status::Valid };
+            return Some(rad_s);
         }
-        self.beyond(state, p, error)
+        None
     }
 
     /// The step where a limit is met, or there is no phase to measure.
     #[cold]
     #[inline(never)]
-    fn beyond(&self, state: &mut LockState<T>, p: &Pendulum<T>, error: T) -> Correction<T> {
+    fn beyond(&self, state: &mut LockState<T>, p: &Pendulum<T>) -> Correction<T> {
+        let error = phase_error(p);
         let held = state.detuning_rad_s.bounded(self.limit_rad_s);
-        if within(error, T::one()) {
+        if error.within(T::one()) {
             state.detuning_rad_s = (held + self.integral_gain_per_s * error).bounded(self.limit_rad_s);
             let rad_s = (self.gain_per_s * error + state.detuning_rad_s).bounded(self.limit_rad_s);
             Correction { rad_s, status: Status::Valid }
@@ -119,8 +129,8 @@ impl<T: Float> PhaseLock<T> {
     }
 }
 
-/// −`limit` ≤ `value` ≤ `limit`; false where either is not a number.
-#[inline]
-fn within<T: Float>(value: T, limit: T) -> bool {
-    value >= -limit && value <= limit
+/// −L/(2E), which is δ for a thin orbit.
+#[inline(always)]
+fn phase_error<T: Float>(p: &Pendulum<T>) -> T {
+    -(T::half() * p.l / p.e)
 }

@@ -14,7 +14,8 @@ use crate::{ConfigError, Direction};
 pub struct Precession<T> {
     pub(crate) share: T,
     pub(crate) jump_sin_2: T,
-    pub(crate) lead_windows: T,
+    /// half the lead, in windows
+    pub(crate) half_lead: T,
     pub(crate) window_s: T,
     pub(crate) least_2: T,
 }
@@ -85,7 +86,7 @@ impl<T: Float> Precession<T> {
         Ok(Self {
             share: T::from_f64(window_s / smoothing_s),
             jump_sin_2: T::from_f64(Real::sin_cos(2.0 * jump).0),
-            lead_windows: T::from_f64(lead_s / window_s),
+            half_lead: T::from_f64(0.5 * lead_s / window_s),
             window_s: T::from_f64(window_s),
             least_2: T::from_f64(least_v * least_v),
         })
@@ -96,17 +97,46 @@ impl<T: Float> Precession<T> {
     /// Follows the pattern to the window of the pendulum variables `p`. Total.
     #[inline]
     pub fn step(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {
+        if self.step_steadily(state, p) { Movement::Steady } else { self.step_otherwise(state, p) }
+    }
+
+    /// [`Precession::step`] of a pattern that moves steadily and on one side of the R axis. False, and nothing changed,
+    /// elsewhere.
+    #[inline(always)]
+    pub fn step_steadily(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> bool {
+        let line = p.r.norm(p.s);
+        // false for NaN
+        if !(line > self.least_2) {
+            return false;
+        }
+        let scale = T::one() / line;
+        let (cos_2, sin_2) = (p.r * scale, p.s * scale);
+        let (along, across) = state.turn(cos_2, sin_2);
+        let sin_2_per_window = state.smoothed(self.share, across);
+        // false for any NaN; the state may hold anything
+        let steady = (along - T::one()).within(T::half())
+            && across.within(self.jump_sin_2)
+            && sin_2 * state.sin_2 > T::zero()
+            && sin_2_per_window.within(self.jump_sin_2);
+        if steady {
+            *state = PrecessionState { cos_2, sin_2, sin_2_per_window, ..*state };
+        }
+        steady
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn step_otherwise(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {
         let line = p.r.norm(p.s);
         // false for NaN
         if !(line > self.least_2 && line.is_finite()) {
-            return self.lost(state);
+            *state = PrecessionState { half_turns: state.half_turns, ..PrecessionState::default() };
+            return Movement::Unknown;
         }
         let scale = T::one() / line;
-        // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
-        let (cos_2, sin_2) = (p.r * scale, p.s * scale + T::zero());
+        let (cos_2, sin_2) = (p.r * scale, p.s * scale);
         let (before_cos, before_sin) = (state.cos_2, state.sin_2);
-        let across = sin_2 * before_cos - cos_2 * before_sin;
-        let along = cos_2 * before_cos + sin_2 * before_sin;
+        let (along, across) = state.turn(cos_2, sin_2);
         (state.cos_2, state.sin_2) = (cos_2, sin_2);
         // the state may hold anything: a pair that is no unit vector is no last direction
         if !(along <= T::two() && (along.magnitude() + across.magnitude()) > T::half()) {
@@ -121,27 +151,18 @@ impl<T: Float> Precession<T> {
                 state.half_turns = state.half_turns.saturating_sub(1);
             }
         }
-        if along > T::zero() && across <= self.jump_sin_2 && across >= -self.jump_sin_2 {
-            let held = state.sin_2_per_window.bounded(self.jump_sin_2);
-            state.sin_2_per_window = held + self.share * (across - held);
+        if along > T::zero() && across.within(self.jump_sin_2) {
+            state.sin_2_per_window = state.smoothed(self.share, across).bounded(self.jump_sin_2);
             Movement::Steady
         } else {
             Movement::Jumped
         }
     }
 
-    #[cold]
-    #[inline(never)]
-    fn lost(&self, state: &mut PrecessionState<T>) -> Movement {
-        (state.cos_2, state.sin_2) = (T::zero(), T::zero());
-        state.sin_2_per_window = T::zero();
-        Movement::Unknown
-    }
-
     /// The direction where the pattern will be when it is used. For the small angles of the lead, to second order.
-    #[inline]
+    #[inline(always)]
     pub fn ahead(&self, state: &PrecessionState<T>, d: &Direction<T>) -> Direction<T> {
-        let psi = T::half() * state.sin_2_per_window.bounded(self.jump_sin_2) * self.lead_windows;
+        let psi = state.sin_2_per_window.bounded(self.jump_sin_2) * self.half_lead;
         let length = T::one() - T::half() * psi * psi;
         Direction { cos: d.cos * length - d.sin * psi, sin: d.sin * length + d.cos * psi, status: d.status }
     }
@@ -153,10 +174,23 @@ impl<T: Float> Precession<T> {
 }
 
 impl<T: Float> PrecessionState<T> {
+    /// Cosine and sine of twice the angle from the last direction to the one of (`cos_2`, `sin_2`).
+    #[inline(always)]
+    fn turn(&self, cos_2: T, sin_2: T) -> (T, T) {
+        (cos_2 * self.cos_2 + sin_2 * self.sin_2, sin_2 * self.cos_2 - cos_2 * self.sin_2)
+    }
+
+    /// The low-passed motion after one of `across`.
+    #[inline(always)]
+    fn smoothed(&self, share: T, across: T) -> T {
+        self.sin_2_per_window + share * (across - self.sin_2_per_window)
+    }
+
     /// The unwrapped angle as half turns and the angle within (−90°, 90°], rad: **Equation 4** with its jumps counted.
     /// 0 where there is no direction.
     pub fn angle(&self) -> (i32, T) {
-        let within = T::half() * self.sin_2.atan2(self.cos_2);
+        // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
+        let within = T::half() * (self.sin_2 + T::zero()).atan2(self.cos_2);
         (self.half_turns, within.bounded(T::half() * T::PI))
     }
 

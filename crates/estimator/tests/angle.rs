@@ -1,7 +1,7 @@
 //! The pattern angle: Equation 4, unwrapped, whatever comes in.
 
 use approx::assert_abs_diff_eq;
-use cvg_estimator::direction::major_axis;
+use cvg_estimator::direction::{major_axis, major_axis_of};
 use cvg_estimator::{AngleState, PatternAngle, Period, Status};
 use cvg_model::{Envelope, Orbit};
 use proptest::prelude::*;
@@ -107,6 +107,29 @@ proptest! {
         // … in the sense of the in-phase vibration
         prop_assert!(direction.cos * e.x_c + direction.sin * e.y_c > 0.0);
         prop_assert!((direction.angle() - theta).sin().abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_direction_of_twice_the_angle_is_that_of_the_envelope(
+        theta in -3.1_f64..3.1, q in -0.9_f64..0.9, delta in -1.5_f64..1.5, a in 1e-3_f64..1e3,
+    ) {
+        let e = Orbit { a, q: q * a, theta, delta }.envelope();
+        let p = e.pendulum();
+        let line = p.r.hypot(p.s);
+        let (of, direction) = (major_axis_of(&e, p.r / line, p.s / line), major_axis(&e, &p));
+        prop_assert_eq!(of.status, Status::Valid);
+        prop_assert!((of.cos - direction.cos).abs() < 1e-15 && (of.sin - direction.sin).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_direction_of_twice_the_angle_is_a_unit_vector_for_any_bit_pattern(
+        bits in prop::array::uniform4(any::<u64>()), cos_2: u64, sin_2: u64, origin: bool,
+    ) {
+        let [x_c, x_s, y_c, y_s] = bits.map(f64::from_bits);
+        let zero = if origin { 0.0 } else { 1.0 };
+        let of = |e, c, s| major_axis_of(&e, zero * c, zero * s);
+        let d = of(Envelope::new(x_c, x_s, y_c, y_s), f64::from_bits(cos_2), f64::from_bits(sin_2));
+        prop_assert!((d.cos.hypot(d.sin) - 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use cvg_estimator::Compensation;
 use cvg_model::Envelope;
 use cvg_model::Orbit;
-use cvg_model::effects::{EffectId, Moment, Stage, Values};
+use cvg_model::effects::{EffectId, Inverse, Moment, Stage, Values};
 use proptest::prelude::*;
 
 fn readout_effects() -> Vec<EffectId> {
@@ -68,6 +68,89 @@ proptest! {
         chain.reverse();
         let compensation = Compensation::<f64, 16>::new(&chain).expect("within bounds");
         prop_assert!(distance(&compensation.apply(read, &at), &z) < 1e-7);
+    }
+
+    #[test]
+    fn the_chain_at_once_is_the_chain_one_by_one(
+        seen in vibration(), at in moment(), unit in prop::array::uniform4(-0.3_f64..0.3), chosen in any::<u16>(),
+        twice: bool,
+    ) {
+        let all = readout_effects();
+        let mut chain: Vec<_> = (0..all.len())
+            .filter(|i| chosen >> i & 1 == 1)
+            .map(|i| (all[i], reasonable(all[i], unit)))
+            .collect();
+        if twice {
+            chain.extend(chain.clone());
+        }
+        chain.sort_by_key(|(id, _)| *id);
+        let compensation = Compensation::<f64, 32>::new(&chain).expect("within bounds");
+        let one_by_one = chain.iter().rev().fold(seen, |e, (id, values)| id.unread(values, e, &at));
+        let at_once = compensation.apply(seen, &at);
+        let size = one_by_one.pendulum().e.sqrt().max(1.0);
+        // NaN where one is NaN
+        prop_assert!(!(distance(&at_once, &one_by_one) > 1e-13 * size), "{:?}: {:?}, {:?}", chain, at_once, one_by_one);
+        prop_assert_eq!(compensation.apply_at(seen, || at), at_once);
+        let single: Vec<_> = chain.iter().map(|(id, values)| (*id, values.map(|v| v as f32))).collect();
+        let narrow = |e: Envelope<f64>| Envelope::new(e.x_c as f32, e.x_s as f32, e.y_c as f32, e.y_s as f32);
+        let forms = single.iter().all(|(id, values)| id.inverse(values) != Inverse::Unread);
+        if forms && !twice {
+            let least = Compensation::<f32, 32>::new(&single).expect("within bounds").apply(narrow(seen), &Moment::default());
+            let wide = Envelope::new(least.x_c.into(), least.x_s.into(), least.y_c.into(), least.y_s.into());
+            prop_assert!(distance(&wide, &one_by_one) < 3e-6, "{:?}: {:?}, {:?}", chain, wide, one_by_one);
+        }
+    }
+
+    #[test]
+    fn an_inverse_has_the_form_that_its_effect_says(
+        seen in vibration(), other in vibration(), at in moment(), unit in prop::array::uniform4(-1.0_f64..1.0),
+        share in -1.0_f64..2.0,
+    ) {
+        let never = Moment::default();
+        for id in readout_effects() {
+            let values = reasonable(id, unit);
+            let of = |e| id.unread(&values, e, &at);
+            match id.inverse(&values) {
+                Inverse::Unread => {}
+                Inverse::Affine => {
+                    // straight lines stay straight, and a quarter turn of the phase turns what is not the offset
+                    let between = of(seen * share + other * (1.0 - share));
+                    prop_assert!(distance(&between, &(of(seen) * share + of(other) * (1.0 - share))) < 1e-12, "{}", id);
+                    let linear = |e| of(e) - of(Envelope::zero());
+                    prop_assert!(distance(&linear(seen.quarter_ahead()), &linear(seen).quarter_ahead()) < 1e-12, "{}", id);
+                    let offset = of(Envelope::zero());
+                    prop_assert!(offset.x_s == 0.0 && offset.y_s == 0.0, "{}", id);
+                }
+                Inverse::Cubic(cubic) => prop_assert_eq!(cubic.undo(seen), of(seen), "{}", id),
+            }
+            if id.inverse(&values) != Inverse::Unread {
+                prop_assert_eq!(of(seen), id.unread(&values, seen, &never), "{}", id);
+            }
+        }
+    }
+
+    #[test]
+    fn a_weak_cubic_is_undone_to_rounding_in_single_precision(m in 0.01_f32..1.0, k in -0.0186_f32..0.0186, turn in 0.0_f32..6.2) {
+        let (cubic, values) = (EffectId::DetectionCubic, [k / (0.75 * m * m), 0.0, 0.0, 0.0]);
+        let (s, c) = turn.sin_cos();
+        let seen = Envelope::new(m * c, m * s, 0.0, 0.0);
+        let back = cubic.unread(&values, seen, &Moment::default());
+        let wide = Envelope::new(f64::from(seen.x_c), f64::from(seen.x_s), 0.0, 0.0);
+        let exact = cubic.unread(&values.map(f64::from), wide, &Moment::default());
+        for (v, e) in [(back.x_c, exact.x_c), (back.x_s, exact.x_s)] {
+            prop_assert!((f64::from(v) - e).abs() <= 0.75 * f64::from(f32::EPSILON) * f64::from(m), "{v} {e}");
+        }
+    }
+}
+
+#[test]
+fn a_cubic_is_undone_alike_on_both_sides_of_the_bound_of_its_series() {
+    let cubic = EffectId::DetectionCubic;
+    // ¾κ at amplitude 1: below and above ε^¼ in double precision
+    for k in [1.2e-4_f64, 1.22e-4, -1.2e-4, -1.22e-4] {
+        let values = [k / 0.75, 0.0, 0.0, 0.0];
+        let z = cubic.unread(&values, Envelope::new(1.0, 0.0, 0.0, 0.0), &Moment::default());
+        assert!((z.x_c * (1.0 + k * z.x_c * z.x_c) - 1.0).abs() < 3e-16, "{k}: {z:?}");
     }
 }
 

@@ -3,12 +3,15 @@
 use cvg_controller::supervisor::{self, Observation, Orders};
 use cvg_controller::{Mode, OrbitCommands, PiState, SupervisorState};
 use cvg_estimator::beat::phase_ahead;
-use cvg_estimator::direction::major_axis;
-use cvg_estimator::{Beat, Direction, LockState, Measurement, Movement, PrecessionState, Window};
+use cvg_estimator::direction::major_axis_of;
+use cvg_estimator::{Beat, Compensation, LockState, Movement, PrecessionState, Status as Measured, Window};
 use cvg_model::effects::Moment;
-use cvg_model::{AxisForces, Envelope, Float, Pendulum};
+use cvg_model::{AxisForces, ControlOutputs, Envelope, Float, Pendulum};
 
-use crate::{Instrument, Seen, State, Status};
+use crate::{Instrument, MOST_COMPENSATED, Seen, State, Status};
+
+#[cfg(test)]
+mod tests;
 
 impl<T: Float> Instrument<T> {
     /// The state at power-on: at rest, or after a brown-out with the resonator still vibrating; it finds out.
@@ -52,7 +55,12 @@ impl<T: Float> Instrument<T> {
         let now = state.phasor;
         let full = self.demodulator.add(&mut state.window, x, y, &now);
         state.phasor.advance();
-        if full { self.last(state, x, y, now.cos, now.sin) } else { self.put_out(state, now.cos, now.sin) }
+        if full {
+            self.last(state, x, y, now.cos, now.sin)
+        } else {
+            let (x, y) = self.put_out(&state.drive, now.cos, now.sin);
+            (x, y, state.status)
+        }
     }
 
     /// A sample at the end of the converters' range, or one that is no number.
@@ -63,55 +71,167 @@ impl<T: Float> Instrument<T> {
         self.sample(state, x, y)
     }
 
-    /// The last sample of a window, taken at the phase of (`cos`, `sin`).
+    /// The last sample of a window, taken at the phase of (`cos`, `sin`). What is rare is a call at its end, here and
+    /// below, so that nothing has to be kept over it.
     #[inline(never)]
     fn last(&self, state: &mut State<T>, x: T, y: T, cos: T, sin: T) -> (T, T, Status) {
-        state.window.last = (x, y);
-        state.status = self.control(state);
-        let (x, y, status) = self.put_out(state, cos, sin);
-        (x, y, Status { fresh: true, ..status })
+        let window = Window { last: (x, y), ..state.window };
+        let now = window.fingerprint();
+        // the sums of two windows are seldom the same
+        let usual = window.clipped == 0 && now[0] != state.fingerprint[0] && now[1] != state.fingerprint[1];
+        let readout = match self.demodulator.envelope(&window, &state.phasor) {
+            Some(readout) if usual => readout,
+            _ => return self.last_otherwise(state, x, y, cos, sin),
+        };
+        state.fingerprint = now;
+        state.seen.readout = readout;
+        let vibration = match &self.readout {
+            None => readout,
+            Some(inverse) => match inverse.apply_at_any_moment(readout) {
+                Some(vibration) => vibration,
+                None => return self.last_at_its_moment(state, inverse, cos, sin),
+            },
+        };
+        self.go_on(state, vibration, cos, sin)
+    }
+
+    /// The last sample of a window without an envelope, or with one that is to be suspected.
+    #[cold]
+    #[inline(never)]
+    fn last_otherwise(&self, state: &mut State<T>, x: T, y: T, cos: T, sin: T) -> (T, T, Status) {
+        let window = Window { last: (x, y), ..state.window };
+        let measured = self.demodulator.finish(&window, &state.phasor);
+        let valid = measured.status == Measured::Valid;
+        let repeats = repeats(&measured.fingerprint, &state.fingerprint);
+        state.fingerprint = measured.fingerprint;
+        state.seen.readout = measured.envelope;
+        state.seen.compensated = match &self.readout {
+            Some(inverse) if valid => inverse.apply_at(measured.envelope, || self.moment(state)),
+            _ => measured.envelope,
+        };
+        self.otherwise(state, Suspicion { spoilt: !valid, clipped: measured.clipped > 0, repeats }, cos, sin)
+    }
+
+    /// The last sample of a window whose readout is compensated by effects that depend on the moment.
+    #[inline(never)]
+    fn last_at_its_moment(
+        &self,
+        state: &mut State<T>,
+        inverse: &Compensation<T, MOST_COMPENSATED>,
+        cos: T,
+        sin: T,
+    ) -> (T, T, Status) {
+        let vibration = inverse.apply(state.seen.readout, &self.moment(state));
+        self.go_on(state, vibration, cos, sin)
+    }
+
+    /// The control step after a window with nothing to be suspected, and what is put out.
+    #[inline(always)]
+    fn go_on(&self, state: &mut State<T>, vibration: Envelope<T>, cos: T, sin: T) -> (T, T, Status) {
+        state.seen.compensated = vibration;
+        let p = vibration.pendulum();
+        if self.supervisor.goes_on(&state.supervisor, &p) {
+            if state.supervisor.mode == Mode::Hold {
+                return self.go_on_held(state, cos, sin);
+            }
+            if let Some(out) = self.steadily::<false>(state, &vibration, &p, cos, sin) {
+                return out;
+            }
+        }
+        self.otherwise(state, Suspicion::default(), cos, sin)
+    }
+
+    #[inline(never)]
+    fn go_on_held(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
+        let e = state.seen.compensated;
+        match self.steadily::<true>(state, &e, &e.pendulum(), cos, sin) {
+            Some(out) => out,
+            None => self.otherwise(state, Suspicion::default(), cos, sin),
+        }
+    }
+
+    /// The control step of nearly every window, in whole-angle mode or hold: nothing is amiss, nothing at a limit. None, and
+    /// nothing changed, elsewhere; [`Instrument::control`] does the same at every window.
+    #[inline(always)]
+    fn steadily<const HOLD: bool>(
+        &self,
+        state: &mut State<T>,
+        e: &Envelope<T>,
+        p: &Pendulum<T>,
+        cos: T,
+        sin: T,
+    ) -> Option<(T, T, Status)> {
+        let (mut energy, mut quadrature, mut rate, mut lock) = (state.energy, state.quadrature, state.rate, state.lock);
+        let mut precession = state.precession;
+        if !self.precession.step_steadily(&mut precession, p) {
+            return None;
+        }
+        let v_as = self.energy.energy_within(&mut energy, p.e, self.energy_set_v2)?;
+        let v_qc = self.quadrature.quadrature_within(&mut quadrature, p.q)?;
+        let v_qs = if HOLD { self.rate.step(&mut rate, p, &self.hold).volts } else { T::zero() };
+        let correction_rad_s = self.phase.step_within(&mut lock, p)?;
+        let now = major_axis_of(e, precession.cos_2, precession.sin_2);
+        if now.status != Measured::Valid {
+            return None;
+        }
+        let then = self.precession.ahead(&precession, &now);
+        let forces = if HOLD {
+            let commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: T::zero() };
+            self.allocation.step_within(&commands, then.cos, then.sin)?
+        } else {
+            self.allocation.axes_within(&ControlOutputs { v_as, v_qc }, then.cos, then.sin)?
+        };
+        let phasor = self.oscillator.tune_within(&state.phasor, correction_rad_s)?;
+
+        let drive = self.delayed(&forces, correction_rad_s);
+        let status = Status { mode: state.supervisor.mode, fault: None, fresh: false, clipped: false, valid: true };
+        state.supervisor.count();
+        (state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);
+        if HOLD {
+            state.rate = rate;
+        }
+        state.drive = drive;
+        let seen = &mut state.seen;
+        (seen.v_as, seen.v_qc, seen.v_qs, seen.correction_rad_s) = (v_as, v_qc, v_qs, correction_rad_s);
+        state.windows = state.windows.wrapping_add(1);
+        state.phasor = phasor;
+        state.window = Window::begin(&phasor);
+        state.status = status;
+        let (x, y) = self.put_out(&drive, cos, sin);
+        Some((x, y, Status { fresh: true, ..status }))
+    }
+
+    /// The control step at every window, with the envelopes that `state.seen` has, and what is put out.
+    #[cold]
+    #[inline(never)]
+    fn otherwise(&self, state: &mut State<T>, suspicion: Suspicion, cos: T, sin: T) -> (T, T, Status) {
+        state.status = self.control(state, suspicion);
+        let (x, y) = self.put_out(&state.drive, cos, sin);
+        (x, y, Status { fresh: true, ..state.status })
     }
 
     /// The drives at the phase of (`cos`, `sin`).
     #[inline(always)]
-    fn put_out(&self, state: &State<T>, cos: T, sin: T) -> (T, T, Status) {
-        let d = &state.drive;
+    fn put_out(&self, d: &AxisForces<T>, cos: T, sin: T) -> (T, T) {
         let (x, y) = (d.x_c * cos + d.x_s * sin, d.y_c * cos + d.y_s * sin);
-        // false for NaN
-        if x.magnitude() <= self.dac_limit_v && y.magnitude() <= self.dac_limit_v {
-            (x, y, state.status)
-        } else {
-            self.limited(state, x, y)
-        }
+        if x.within(self.dac_limit_v) && y.within(self.dac_limit_v) { (x, y) } else { self.limited(x, y) }
     }
 
     #[cold]
     #[inline(never)]
-    fn limited(&self, state: &State<T>, x: T, y: T) -> (T, T, Status) {
-        (x.bounded(self.dac_limit_v), y.bounded(self.dac_limit_v), state.status)
+    fn limited(&self, x: T, y: T) -> (T, T) {
+        (x.bounded(self.dac_limit_v), y.bounded(self.dac_limit_v))
     }
 
-    /// The control step, after the last sample of a window.
-    #[inline(never)]
-    fn control(&self, state: &mut State<T>) -> Status {
-        let measured = self.demodulator.finish(&state.window, &state.phasor);
-        let valid = matches!(measured.status, cvg_estimator::Status::Valid);
-        let compensated = match &self.readout {
-            Some(compensation) if valid => compensation.apply(measured.envelope, &self.moment(state)),
-            _ => measured.envelope,
-        };
+    /// The control step with the envelopes that `state.seen` has.
+    #[inline(always)]
+    fn control(&self, state: &mut State<T>, Suspicion { spoilt, clipped, repeats }: Suspicion) -> Status {
+        let compensated = state.seen.compensated;
         let pendulum = compensated.pendulum();
         // false where the compensation found no vibration behind the readout
-        let valid = valid && pendulum.e.is_finite();
+        let valid = !spoilt && pendulum.e.is_finite();
         let moved = if valid { self.precession.step(&mut state.precession, &pendulum) } else { Movement::Unknown };
-        let observation = Observation {
-            pendulum,
-            valid,
-            clipped: measured.clipped > 0,
-            repeats: repeats(&measured, &state.fingerprint),
-            jumped: moved == Movement::Jumped,
-        };
-        state.fingerprint = measured.fingerprint;
+        let observation = Observation { pendulum, valid, clipped, repeats, jumped: moved == Movement::Jumped };
         let beat = match state.supervisor.mode {
             Mode::Listen => {
                 if valid {
@@ -123,25 +243,17 @@ impl<T: Float> Instrument<T> {
             _ => None,
         };
         let orders = self.supervisor.step(&mut state.supervisor, &observation, beat);
-        state.seen.readout = measured.envelope;
-        state.seen.compensated = compensated;
-        self.obey(state, &orders, &compensated, &pendulum);
+        self.obey(state, orders, &compensated, &pendulum);
         state.windows = state.windows.wrapping_add(1);
         state.phasor = self.oscillator.tune(&state.phasor, state.seen.correction_rad_s);
         state.window = Window::begin(&state.phasor);
-        Status {
-            mode: state.supervisor.mode,
-            fault: state.supervisor.fault_now(),
-            fresh: false,
-            clipped: measured.clipped > 0,
-            valid,
-        }
+        Status { mode: state.supervisor.mode, fault: state.supervisor.fault_now(), fresh: false, clipped, valid }
     }
 
     /// Runs the loops that `orders` ask for, and sets the drives and the oscillator.
     #[inline]
-    fn obey(&self, state: &mut State<T>, orders: &Orders<T>, e: &Envelope<T>, p: &Pendulum<T>) {
-        if let Orders::Run { hold, ring_down } = *orders {
+    fn obey(&self, state: &mut State<T>, orders: Orders<T>, e: &Envelope<T>, p: &Pendulum<T>) {
+        if let Orders::Run { hold, ring_down } = orders {
             let v_as = if ring_down {
                 T::zero()
             } else {
@@ -150,23 +262,27 @@ impl<T: Float> Instrument<T> {
             let v_qc = self.quadrature.quadrature(&mut state.quadrature, p.q).volts;
             let v_qs = if hold { self.rate.step(&mut state.rate, p, &self.hold).volts } else { T::zero() };
             let correction_rad_s = self.phase.step(&mut state.lock, p).rad_s;
-            let now: Direction<T> = major_axis(e, p);
+            let now = major_axis_of(e, state.precession.cos_2, state.precession.sin_2);
             let then = self.precession.ahead(&state.precession, &now);
             let commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: T::zero() };
             let forces = self.allocation.step(&commands, then.cos, then.sin).volts;
             state.drive = self.delayed(&forces, correction_rad_s);
-            state.seen = Seen { v_as, v_qc, v_qs, correction_rad_s, ..state.seen };
+            let seen = &mut state.seen;
+            (seen.v_as, seen.v_qc, seen.v_qs, seen.correction_rad_s) = (v_as, v_qc, v_qs, correction_rad_s);
         } else {
-            self.obey_otherwise(state, orders, e, p);
+            self.obey_otherwise(state, orders, *e, *p);
         }
     }
 
+    /// What is seldom, by value: what nobody else wants in memory is put there by this call alone.
+    #[cold]
     #[inline(never)]
-    fn obey_otherwise(&self, state: &mut State<T>, orders: &Orders<T>, e: &Envelope<T>, p: &Pendulum<T>) {
+    fn obey_otherwise(&self, state: &mut State<T>, orders: Orders<T>, e: Envelope<T>, p: Pendulum<T>) {
+        let (e, p) = (&e, &p);
         let zero = T::zero();
         state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
         let mut correction_rad_s = state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s());
-        match *orders {
+        match orders {
             Orders::Rest | Orders::Run { .. } => {}
             Orders::Listen => correction_rad_s = self.listening(state),
             Orders::Sweep { correction_rad_s: swept, opposed } => {
@@ -211,7 +327,7 @@ impl<T: Float> Instrument<T> {
 
     /// The commands with the delay of the whole loop undone: f(t) is to have the phase of the vibration at the middle of
     /// the output's hold, which is ahead of the oscillator's phase at the sample by ω times the delay.
-    #[inline]
+    #[inline(always)]
     fn delayed(&self, f: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
         // the correction's own share is small: first order
         let more = correction_rad_s * self.delay_s;
@@ -236,9 +352,20 @@ impl<T: Float> Instrument<T> {
     }
 }
 
+/// What is wrong with a window.
+#[derive(Clone, Copy, Default)]
+struct Suspicion {
+    /// it has no envelope
+    spoilt: bool,
+    /// a sample was at the end of the range
+    clipped: bool,
+    /// a channel repeats the last window
+    repeats: bool,
+}
+
 /// A channel's samples are those of the last window, to the last bit, and not all nothing.
 #[inline]
-fn repeats<T: Float>(m: &Measurement<T>, [x, y, last_x, last_y]: &[T; 4]) -> bool {
-    let [sum_x, sum_y, now_x, now_y] = m.fingerprint;
-    (sum_x == *x && now_x == *last_x && now_x != T::zero()) || (sum_y == *y && now_y == *last_y && now_y != T::zero())
+fn repeats<T: Float>([sum_x, sum_y, now_x, now_y]: &[T; 4], [x, y, last_x, last_y]: &[T; 4]) -> bool {
+    let zero = T::zero();
+    (sum_x == x && now_x == last_x && *now_x != zero) || (sum_y == y && now_y == last_y && *now_y != zero)
 }

@@ -38,6 +38,12 @@ pub trait Real:
     /// The angle of the point (`x`, `self`) in radians, in (−π, π]; 0 for the origin.
     fn atan2(self, x: Self) -> Self;
 
+    /// The distance from 1 to the next larger number; 0 for a scalar that does not round.
+    #[inline]
+    fn epsilon() -> Self {
+        Self::zero()
+    }
+
     /// 0
     #[inline]
     fn zero() -> Self {
@@ -98,15 +104,26 @@ pub trait Float: Real {
     /// `limit` is negative: a bound that holds for every bit pattern.
     #[inline]
     fn bounded(self, limit: Self) -> Self {
-        if self >= -limit && self <= limit {
-            self
-        } else if limit >= Self::zero() && self > limit {
-            limit
-        } else if limit >= Self::zero() && self < -limit {
-            -limit
-        } else {
-            Self::zero()
-        }
+        if self.within(limit) { self } else { nearer_end(self, limit) }
+    }
+
+    /// −`limit` ≤ `self` ≤ `limit`; false where either is NaN or `limit` is negative.
+    #[inline(always)]
+    fn within(self, limit: Self) -> bool {
+        self.magnitude() <= limit
+    }
+}
+
+/// The end of [−`limit`, `limit`] that `value`, which is not in it, is beyond; 0 where there is none.
+#[cold]
+#[inline(never)]
+fn nearer_end<T: Float>(value: T, limit: T) -> T {
+    if limit >= T::zero() && value > limit {
+        limit
+    } else if limit >= T::zero() && value < -limit {
+        -limit
+    } else {
+        T::zero()
     }
 }
 
@@ -128,6 +145,10 @@ macro_rules! machine_float {
             #[inline]
             fn atan2(self, x: Self) -> Self {
                 $atan2(self, x)
+            }
+            #[inline]
+            fn epsilon() -> Self {
+                $t::EPSILON
             }
         }
         impl Float for $t {

@@ -9,6 +9,8 @@ use crate::supervisor::{Beat, Fault, Mode, Observation, Orders, Supervisor, Supe
 fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
     Supervisor {
         set_2: kani::any(),
+        low_2: kani::any(),
+        high_2: kani::any(),
         heard_2: kani::any(),
         band_rad_s: kani::any(),
         sweep: kani::any(),

@@ -15,7 +15,7 @@ fn any_precession<T: Float + Arbitrary>() -> Precession<T> {
     Precession {
         share: share(T::one()),
         jump_sin_2: share(T::one()),
-        lead_windows: share(T::ratio(10, 1)),
+        half_lead: share(T::ratio(5, 1)),
         window_s: positive(),
         least_2: positive(),
     }

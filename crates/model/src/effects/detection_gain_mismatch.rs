@@ -1,6 +1,6 @@
 //! Unequal readout gains: y_d = g·y with g = G_Dy/G_Dx (Equations 5 to 7).
 
-use super::{Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Description, Effect, Inverse, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{DetectionGains, Envelope, Real};
 
 /// unequal detection gains.
@@ -38,5 +38,9 @@ impl Effect for DetectionGainMismatch {
     #[inline]
     fn unread<T: Real>(&[g, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         DetectionGains { x: T::one(), y: T::one() / g }.measure(&e)
+    }
+
+    fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
+        Inverse::Affine
     }
 }

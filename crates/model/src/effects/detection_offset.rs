@@ -1,6 +1,6 @@
 //! Constant in-phase offsets of the demodulated readout, V: x_d = x + o_x, y_d = y + o_y.
 
-use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
+use super::{Description, Effect, Inverse, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
 /// offsets of the readout.
@@ -30,5 +30,9 @@ impl Effect for DetectionOffset {
     #[inline]
     fn unread<T: Real>(&[o_x, o_y, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         Envelope::new(e.x_c - o_x, e.x_s, e.y_c - o_y, e.y_s)
+    }
+
+    fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
+        Inverse::Affine
     }
 }

@@ -1,6 +1,6 @@
 //! A readout whose axes are not orthogonal, or that couples X into Y: y_d = y + s·x.
 
-use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
+use super::{Description, Effect, Inverse, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
 /// skewed or cross-coupled readout axes.
@@ -30,5 +30,9 @@ impl Effect for DetectionSkew {
     #[inline]
     fn unread<T: Real>(&[s, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         Envelope::new(e.x_c, e.x_s, e.y_c - s * e.x_c, e.y_s - s * e.x_s)
+    }
+
+    fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
+        Inverse::Affine
     }
 }

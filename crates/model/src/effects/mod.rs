@@ -29,6 +29,8 @@ pub mod spring_cubic;
 pub mod table_harmonic;
 pub mod time_periodic;
 
+pub use detection_cubic::Cubic;
+
 /// The most parameters one effect may have.
 pub const MAX_PARAMETERS: usize = 4;
 
@@ -186,6 +188,17 @@ impl Description {
 /// An order this close to a whole number is one.
 const WHOLE: f64 = 1e-6;
 
+/// What form the inverse of a readout effect has, for whoever undoes it often.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Inverse<T> {
+    /// nothing simpler than [`Effect::unread`]
+    Unread,
+    /// affine, the same at every moment: one real matrix on (x, y) for both phases, and an offset in phase
+    Affine,
+    /// each channel by itself, the same at every moment: the root of a cubic
+    Cubic(Cubic<T>),
+}
+
 /// An effect: its description and its forward definition in the stage where it acts.
 pub trait Effect {
     /// What is known of it.
@@ -226,6 +239,12 @@ pub trait Effect {
             z = z + (e - Self::read(p, z, at));
         }
         z
+    }
+
+    /// The form of [`Effect::unread`].
+    #[inline]
+    fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
+        Inverse::Unread
     }
 }
 
@@ -296,6 +315,11 @@ macro_rules! library {
             #[inline]
             pub fn unread<T: Real>(self, p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
                 match self { $(Self::$name => <$effect as Effect>::unread(p, e, at)),+ }
+            }
+
+            /// [`Effect::inverse`]
+            pub fn inverse<T: Real>(self, p: &Values<T>) -> Inverse<T> {
+                match self { $(Self::$name => <$effect as Effect>::inverse(p)),+ }
             }
         }
     };
