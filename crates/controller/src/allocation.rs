@@ -128,7 +128,7 @@ impl<T: Float> Allocation<T> {
         if self.fits(&asked) { Drive { volts: asked, status: Status::Within } } else { self.limited(asked) }
     }
 
-    /// [`Allocation::step`] where no channel is near its limit: the volts. None elsewhere.
+    /// [`Allocation::step`] where every channel is within its limit: the volts. None elsewhere.
     #[inline(always)]
     pub fn step_within(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> Option<AxisForces<T>> {
         let asked = self.asked(v, cos, sin);
@@ -143,10 +143,11 @@ impl<T: Float> Allocation<T> {
         if self.fits(&asked) { Some(asked) } else { None }
     }
 
-    /// The sum is within the limit; so is each. False for any NaN.
+    /// Each is within the limit. False for any NaN.
     #[inline(always)]
     fn fits(&self, f: &AxisForces<T>) -> bool {
-        f.x_c.magnitude() + f.x_s.magnitude() + f.y_c.magnitude() + f.y_s.magnitude() <= self.limit_v
+        let fits = |v: T| v.within(self.limit_v);
+        fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && fits(f.y_s)
     }
 
     /// What is asked of the drives.
@@ -169,20 +170,20 @@ impl<T: Float> Allocation<T> {
         }
     }
 
-    /// The drives' commands where the channels together ask for more than the limit of one.
+    /// The drives' commands where a channel is asked for more than the limit, or for no number.
     #[cold]
     #[inline(never)]
     fn limited(&self, asked: AxisForces<T>) -> Drive<T> {
-        let channels = [asked.x_c, asked.x_s, asked.y_c, asked.y_s];
-        let status = if channels.iter().all(|f| f.within(self.limit_v)) {
-            Status::Within
-        } else if channels.iter().all(|f| f.is_finite()) {
-            Status::Limited
-        } else {
-            Status::Invalid
-        };
-        let [x_c, x_s, y_c, y_s] = channels.map(|f| f.bounded(self.limit_v));
-        Drive { volts: AxisForces { x_c, x_s, y_c, y_s }, status }
+        let finite = asked.x_c.is_finite() && asked.x_s.is_finite() && asked.y_c.is_finite() && asked.y_s.is_finite();
+        Drive {
+            volts: AxisForces {
+                x_c: asked.x_c.bounded(self.limit_v),
+                x_s: asked.x_s.bounded(self.limit_v),
+                y_c: asked.y_c.bounded(self.limit_v),
+                y_s: asked.y_s.bounded(self.limit_v),
+            },
+            status: if finite { Status::Limited } else { Status::Invalid },
+        }
     }
 }
 
