@@ -431,6 +431,16 @@ fn an_amplitude_or_a_quadrature_out_of_bounds_is_endured_for_its_time() {
 }
 
 #[test]
+fn an_amplitude_up_to_one_and_a_half_times_its_set_value_is_in_bounds() {
+    for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        for e in [30.0, 50.0, 56.25] {
+            let (after, _) = step(SupervisorState { bad: 3, ..in_mode(mode, 3) }, &energy(e));
+            assert_eq!((after.mode, after.bad), (mode, 2), "{e}");
+        }
+    }
+}
+
+#[test]
 fn an_amplitude_below_half_is_endured_for_its_time_but_in_a_ring_down() {
     for mode in [Mode::WholeAngle, Mode::Hold] {
         let mut state = in_mode(mode, 3);
