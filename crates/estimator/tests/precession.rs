@@ -81,6 +81,10 @@ fn what_passes_the_positive_axis_is_no_half_turn() {
     for (from, to) in [(0.1, -0.1), (-0.1, 0.1), (0.7, 0.8), (0.8, 0.7), (-0.7, -0.8), (-0.8, -0.7)] {
         assert_eq!(followed([from, to]).0.half_turns, 0, "{from} to {to}");
     }
+    // exactly a quarter of a turn away there is no shorter way
+    let mut state = PrecessionState { cos_2: 0.6, sin_2: 0.8, ..PrecessionState::default() };
+    let movement = tracker().step(&mut state, &Pendulum { e: 4.0, q: 0.0, r: -2.4, s: -3.2, l: 0.0 });
+    assert_eq!((state.cos_2, movement, state.half_turns), (-0.6, Movement::Jumped, 0));
     // the shorter way is taken, also where it is long
     assert_eq!(followed([1.2, 1.2 + 0.7]).0.half_turns, 1);
     assert_eq!(followed([0.2, 0.2 - 0.7]).0.half_turns, 0);
