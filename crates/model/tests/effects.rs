@@ -4,8 +4,8 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use approx::assert_abs_diff_eq;
 use cvg_model::effects::harmonic_n::factor;
-use cvg_model::effects::{EffectId, Moment, Role, Search, Values};
-use cvg_model::{AxisForces, Envelope, Orbit};
+use cvg_model::effects::{Description, Effect, EffectId, Moment, Role, Scaling, Search, Stage, Values};
+use cvg_model::{AxisForces, Envelope, Orbit, Real};
 
 const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 0.3 };
 
@@ -74,6 +74,9 @@ fn a_cubic_readout_grows_with_the_square_of_each_channel() {
     // where no vibration gives the readout the answer is finite
     let beyond = EffectId::DetectionCubic.unread(&[-1e3, 0.0, 0.0, 0.0], VIBRATION, &now());
     assert!(beyond.pendulum().e.is_finite());
+    // past the turning point, here with ¾κm² = −0.3, Newton's first step stays: (1 − 0.9 + 0.3)/(1 − 0.9)
+    let past = EffectId::DetectionCubic.unread(&[-0.4, 0.0, 0.0, 0.0], Envelope::new(1.0, 0.0, 0.0, 0.0), &now());
+    assert_near(past, Envelope::new(4.0, 0.0, 0.0, 0.0));
 }
 
 #[test]
@@ -119,6 +122,9 @@ fn readouts_of_the_angle_turn_the_vibration() {
     assert_near(back, VIBRATION);
     let folded = EffectId::HarmonicN.unread(&[720.0, 0.5, 0.5, 0.0], VIBRATION, &now());
     assert_abs_diff_eq!(folded.pendulum().e, VIBRATION.pendulum().e, epsilon = 1e-14);
+    // where the angle stands still under the harmonic there is no step: 1 − 2 · ½ = 0
+    let along_x = Envelope::new(1.0, 0.0, 0.0, 0.0);
+    assert_eq!(EffectId::HarmonicN.unread(&[2.0, 0.1, 0.5, 0.0], along_x, &now()), along_x);
 }
 
 #[test]
@@ -207,9 +213,64 @@ fn whole_low_orders_of_the_table_have_a_cause_and_what_is_empirical_has_none() {
         (3.0 - 9e-7, true),
         (3.0 + 2e-6, false),
         (3.0 - 2e-6, false),
+        (1e-6, false),
     ] {
         assert_eq!(explains(EffectId::TableHarmonic, order), expected, "{order}");
     }
     assert!(explains(EffectId::DetectionSkew, 0.5));
     assert!(!explains(EffectId::RateOffset, 0.5) && !explains(EffectId::HarmonicN, 4.0));
+}
+
+#[test]
+fn an_effect_scales_with_rate_and_amplitude_as_where_it_acts_says() {
+    for &id in EffectId::ALL {
+        let Description { stage, scaling, .. } = id.description();
+        // what moves the pattern has the longer to do so the slower it turns
+        let rate = match (stage, id) {
+            (Stage::Mechanics | Stage::Actuation, _) => -1,
+            (_, EffectId::AngleLatency) => 1,
+            _ => 0,
+        };
+        let amplitude = match id {
+            EffectId::DetectionCubic | EffectId::DetectionSaturation => 2,
+            EffectId::DetectionOffset => -1,
+            _ => 0,
+        };
+        assert_eq!((scaling.rate, scaling.amplitude), (rate, amplitude), "{id}");
+    }
+}
+
+/// An effect that leaves its inverse to the trait: Y sees a part of X's square.
+struct Bent;
+
+impl Effect for Bent {
+    const DESCRIPTION: Description = Description {
+        id: "bent",
+        title: "bent axes",
+        stage: Stage::Readout,
+        declared: false,
+        empirical: false,
+        in_sensors: false,
+        parameters: &[],
+        onsets: &[],
+        shown: &[],
+        signature: "none",
+        scaling: Scaling { rate: 0, amplitude: 1, odd_in_rate: false },
+        source: "this test",
+    };
+
+    fn read<T: Real>(&[bend, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
+        Envelope::new(e.x_c + bend * e.y_c * e.y_c, e.x_s, e.y_c + bend * e.x_c * e.x_c, e.y_s)
+    }
+}
+
+#[test]
+fn an_effect_without_an_inverse_of_its_own_is_undone_step_by_step() {
+    let bend = [0.02, 0.0, 0.0, 0.0];
+    let back = Bent::unread(&bend, Bent::read(&bend, VIBRATION, &now()), &now());
+    // each of eight steps leaves a fiftieth
+    assert!((back - VIBRATION).pendulum().e.sqrt() < 1e-13, "{back:?}");
+    // what it doesn't act on it leaves
+    assert_eq!(Bent::mechanics(&bend, &VIBRATION), Envelope::zero());
+    assert_eq!(Bent::input_rate(&bend, 3.0, &now()), 3.0);
 }
