@@ -77,6 +77,9 @@ fn a_cubic_readout_grows_with_the_square_of_each_channel() {
     // past the turning point, here with ¾κm² = −0.3, Newton's first step stays: (1 − 0.9 + 0.3)/(1 − 0.9)
     let past = EffectId::DetectionCubic.unread(&[-0.4, 0.0, 0.0, 0.0], Envelope::new(1.0, 0.0, 0.0, 0.0), &now());
     assert_near(past, Envelope::new(4.0, 0.0, 0.0, 0.0));
+    // and where even that would divide by zero, at −1/3, the readout stays
+    let along_x = Envelope::new(1.0, 0.0, 0.0, 0.0);
+    assert_eq!(EffectId::DetectionCubic.unread(&[-4.0 / 9.0, 0.0, 0.0, 0.0], along_x, &now()), along_x);
 }
 
 #[test]
@@ -108,13 +111,13 @@ fn readouts_of_the_angle_turn_the_vibration() {
     let turned = |angle: f64| VIBRATION.turned(angle.sin(), angle.cos());
     // θ(t − t_d) of a pattern that precesses at −0.4 rad/s
     reads(EffectId::AngleLatency, [0.25, 0.0, 0.0, 0.0], turned(0.1), 1e-15);
-    let phase = TAU * 0.3 * 2.5;
+    let phase = TAU * 0.37 * 2.5;
     let disturbed = 0.2 * phase.cos() - 0.1 * phase.sin();
-    reads(EffectId::TimePeriodic, [0.3, 0.2, 0.1, 0.0], turned(disturbed), 1e-15);
+    reads(EffectId::TimePeriodic, [0.37, 0.2, 0.1, 0.0], turned(disturbed), 1e-15);
     let theta = 0.5_f64.atan2(0.6);
     for (scaling, size) in [(0.0, 1.0), (1.0, -1.0), (2.0, -0.4), (3.0, -2.5)] {
         let error = size * (0.01 * (3.0 * theta).cos() - 0.02 * (3.0 * theta).sin());
-        reads(EffectId::HarmonicN, [3.0, 0.01, 0.02, scaling], turned(error), 1e-8);
+        reads(EffectId::HarmonicN, [3.0, 0.01, 0.02, scaling], turned(error), 1e-14);
     }
     // Newton's iteration ends at rounding where the harmonic is weak, and stays finite where it folds
     let weak = [5.0, 0.01, -0.01, 0.0];
