@@ -2,7 +2,7 @@
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
-use cvg_calibration::actuation::actuation_gain_ratio;
+use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Orbit};
 use cvg_tests::domain::{actuation_gains, sizes};

@@ -415,7 +415,8 @@ impl<T: Float> Supervisor<T> {
             };
             return enter(state, mode, orders(mode));
         }
-        if let Some(orders) = self.out_of_bounds(state, p) {
+        // on its way up an amplitude may be low
+        if let Some(orders) = self.out_of_bounds(state, p, false) {
             return orders;
         }
         if state.windows >= self.spin_up {
@@ -443,30 +444,29 @@ impl<T: Float> Supervisor<T> {
             let next = if low { Mode::SpinUp } else { wished };
             return enter(state, next, orders(next));
         }
-        if low && state.mode != Mode::RingDown {
-            state.bad = state.bad.saturating_add(1);
-            if state.bad >= self.endure {
-                return fail(state, Fault::AmplitudeLow);
-            }
-        }
-        if let Some(orders) = self.out_of_bounds(state, p) {
+        if let Some(orders) = self.out_of_bounds(state, p, low && state.mode != Mode::RingDown) {
             return orders;
         }
         orders(state.mode)
     }
 
     /// What is to be done about a phase, an amplitude or a quadrature out of bounds.
-    fn out_of_bounds(&self, state: &mut SupervisorState, p: &Pendulum<T>) -> Option<Orders<T>> {
+    fn out_of_bounds(&self, state: &mut SupervisorState, p: &Pendulum<T>, low: bool) -> Option<Orders<T>> {
         let bound = T::half() * p.e;
         if p.l.magnitude() >= bound {
             return Some(enter(state, Mode::Lock, Orders::Snap));
         }
         let high = p.e > self.high_2;
         let round = p.q.magnitude() >= bound;
-        if high || round {
+        if high || low || round {
             state.bad = state.bad.saturating_add(1);
             if state.bad >= self.endure {
-                return Some(fail(state, if high { Fault::AmplitudeHigh } else { Fault::QuadratureHigh }));
+                let fault = match (high, low) {
+                    (true, _) => Fault::AmplitudeHigh,
+                    (_, true) => Fault::AmplitudeLow,
+                    _ => Fault::QuadratureHigh,
+                };
+                return Some(fail(state, fault));
             }
         } else {
             state.bad = state.bad.saturating_sub(1);

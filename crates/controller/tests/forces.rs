@@ -3,7 +3,7 @@
 use approx::assert_abs_diff_eq;
 use cvg_controller::{ActuationCompensation, Allocation, Heading, OrbitCommands, PiState, RateLoop, Status};
 use cvg_model::effects::EffectId;
-use cvg_model::{ActuationGains, ControlOutputs, Orbit, Pendulum};
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Orbit, Pendulum};
 use proptest::prelude::*;
 
 const LIMIT_V: f64 = 5.0;
@@ -40,6 +40,108 @@ fn the_rate_loop_brings_the_pattern_to_its_heading_and_holds_it_against_a_drift(
         a *= 1.0 - period / 2.0;
     }
     assert_abs_diff_eq!(theta, 1.2, epsilon = 1e-6);
+}
+
+#[test]
+fn parameters_of_the_drives_are_refused_outside_their_bounds_by_name() {
+    let new = |ratio: f64, more: f64| {
+        let effects = [(EffectId::ActuationGainMismatch, [ratio, more, 0.0, 0.0])];
+        ActuationCompensation::new(&effects).map(|_| ()).map_err(|e| e.parameter)
+    };
+    assert_eq!((new(0.2, 0.0), new(5.0, 0.0)), (Ok(()), Ok(())));
+    for bad in [0.19, 5.01, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(new(bad, 0.0), Err("actuation_gain_ratio"), "{bad}");
+    }
+    assert_eq!(new(1.0, 0.5), Err("actuation-gain-mismatch"), "it has one parameter");
+}
+
+#[test]
+fn compensated_drives_along_an_axis_are_the_command_over_the_gain_of_that_axis() {
+    let effects = [(EffectId::ActuationGainMismatch, [4.0, 0.0, 0.0, 0.0])];
+    let allocation = Allocation::new(Some(ActuationCompensation::new(&effects).expect("regular")), LIMIT_V);
+    let command = OrbitCommands { v_as: 1.0, v_ac: 0.5, ..OrbitCommands::default() };
+    let allocation = allocation.expect("valid");
+    // gains of 2 and ½
+    let along_x = allocation.step(&command, 1.0, 0.0);
+    assert_eq!(
+        (along_x.volts, along_x.status),
+        (AxisForces { x_c: 0.25, x_s: 0.5, y_c: 0.0, y_s: 0.0 }, Status::Within)
+    );
+    let along_y = allocation.step(&command, 0.0, 1.0);
+    assert_eq!(
+        (along_y.volts, along_y.status),
+        (AxisForces { x_c: 0.0, x_s: 0.0, y_c: 1.0, y_s: 2.0 }, Status::Within)
+    );
+}
+
+#[test]
+fn a_drive_asked_for_too_much_is_limited_and_for_no_number_is_invalid() {
+    let step = |command: OrbitCommands<f64>, cos, sin| {
+        let drive = plain().step(&command, cos, sin);
+        let f = drive.volts;
+        (drive.status, [f.x_c, f.x_s, f.y_c, f.y_s])
+    };
+    let none = OrbitCommands::default();
+    assert_eq!(step(OrbitCommands { v_as: LIMIT_V, ..none }, 1.0, 0.0), (Status::Within, [0.0, LIMIT_V, 0.0, 0.0]));
+    assert_eq!(step(OrbitCommands { v_as: 5.1, ..none }, 1.0, 0.0), (Status::Limited, [0.0, LIMIT_V, 0.0, 0.0]));
+    assert_eq!(step(OrbitCommands { v_ac: -5.1, ..none }, 0.0, 1.0), (Status::Limited, [0.0, 0.0, -LIMIT_V, 0.0]));
+    // one phase, the other, and one channel, the other
+    let huge = 1e308;
+    for (command, cos, sin) in [
+        (OrbitCommands { v_as: f64::NAN, ..none }, 1.0, 0.5),
+        (OrbitCommands { v_ac: f64::NAN, ..none }, 1.0, 0.5),
+        (OrbitCommands { v_as: huge, v_ac: huge, ..none }, 0.0, 10.0),
+        (OrbitCommands { v_as: huge, v_ac: huge, ..none }, 10.0, 0.0),
+        (OrbitCommands { v_ac: huge, ..none }, 10.0, 10.0),
+        (OrbitCommands { v_as: huge, ..none }, 10.0, 10.0),
+    ] {
+        let (status, volts) = step(command, cos, sin);
+        assert_eq!(status, Status::Invalid, "{command:?}");
+        assert!(volts.iter().all(|v| v.abs() <= LIMIT_V));
+    }
+}
+
+/// A line of amplitude `a`, `off` the heading 0.3 by this angle.
+fn off(a: f64, off: f64) -> Pendulum<f64> {
+    Orbit { a, q: 0.0, theta: 0.3 + off, delta: 0.0 }.envelope().pendulum()
+}
+
+#[test]
+fn the_rate_loop_is_its_law_scaled_by_the_amplitude() {
+    let (omega, damping, b) = (12.0, 0.75, 1.5);
+    let rate = RateLoop::tuned(omega, damping, b, 10.0, 5e-4, LIMIT_V).expect("valid");
+    let target = Heading::new(0.3).expect("finite");
+    let (gain, tau) = (2.0 * damping * omega / b, damping / omega);
+    let (mut state, mut integral) = (PiState::default(), 0.0);
+    for (a, angle) in [(2.0, 0.01), (0.5, -0.02), (1.5, 0.1)] {
+        let error = 0.5 * f64::sin(2.0 * angle);
+        integral += error * 5e-4;
+        let command = rate.step(&mut state, &off(a, angle), &target);
+        assert_abs_diff_eq!(command.volts, a * gain * (error + integral / (2.0 * tau)), epsilon = 1e-12);
+        assert_eq!(command.status, Status::Within);
+    }
+}
+
+#[test]
+fn the_rate_loop_holds_no_more_than_its_largest_rate_and_its_limit() {
+    // 3 rad/s at 1.5 1/s per V and unit amplitude: 2 V
+    let rate = RateLoop::tuned(12.0, 1.0, 1.5, 3.0, 5e-4, LIMIT_V).expect("valid");
+    let target = Heading::new(0.3).expect("finite");
+    for (a, volts) in [(1.0, 2.0), (0.5, 1.0), (2.0, 4.0), (2.75, LIMIT_V)] {
+        let mut state = PiState::default();
+        let command = rate.step(&mut state, &off(a, 0.7), &target);
+        assert_abs_diff_eq!(command.volts, volts, epsilon = 1e-12);
+        assert_eq!(command.status, Status::Limited);
+    }
+    let strong = RateLoop::tuned(12.0, 1.0, 1.5, 100.0, 5e-4, LIMIT_V).expect("valid");
+    let command = strong.step(&mut PiState::default(), &off(2.0, 0.4), &target);
+    assert_eq!((command.volts, command.status), (LIMIT_V, Status::Limited), "by the limit alone");
+    for broken in [Pendulum { e: f64::NAN, ..off(1.0, 0.1) }, Pendulum { e: f64::INFINITY, ..off(1.0, 0.1) }] {
+        let command = rate.step(&mut PiState::default(), &broken, &target);
+        assert_eq!(command.status, Status::Invalid);
+    }
+    let no_direction = rate.step(&mut PiState::default(), &Pendulum::default(), &target);
+    assert_eq!((no_direction.volts, no_direction.status), (0.0, Status::Invalid));
 }
 
 proptest! {

@@ -84,6 +84,29 @@ fn parameters_outside_their_domain_are_refused_by_name() {
     assert_eq!(refused(Pi::tuned(2000.0, 1.0, 1.0, 1.0, PERIOD_S, 1.0)), Some("bandwidth_rad_s"));
 }
 
+#[test]
+fn an_integral_beyond_its_limit_counts_as_the_limit_and_goes_on_from_there() {
+    let pi = pi();
+    let most = 2.0 * 0.25 * LIMIT_V / 7.8;
+    for sign in [1.0, -1.0] {
+        let mut state = PiState { integral: sign * 5.0 };
+        let command = pi.control(&mut state, sign * -0.1);
+        let integral = sign * (most - 0.1 * PERIOD_S);
+        assert_abs_diff_eq!(state.integral, integral, epsilon = 1e-15);
+        assert_abs_diff_eq!(command.volts, 7.8 * (sign * -0.1 + integral / 0.5), epsilon = 1e-12);
+        assert_eq!(command.status, Status::Within);
+    }
+}
+
+#[test]
+fn a_loop_is_realised_below_one_and_not_at_one() {
+    let tuned = |bandwidth: f64, damping: f64| {
+        Pi::tuned(bandwidth, damping, 0.8, 1.5, 1.0 / 2048.0, 1.0).map(|_| ()).map_err(|e| e.parameter)
+    };
+    assert_eq!((tuned(1023.9, 1.0), tuned(2047.9, 0.5)), (Ok(()), Ok(())));
+    assert_eq!((tuned(1024.0, 1.0), tuned(2048.0, 0.5)), (Err("bandwidth_rad_s"), Err("bandwidth_rad_s")));
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_command_within_the_limit(e: u64, integral: u64, later: u64) {

@@ -70,6 +70,45 @@ fn a_threshold_that_is_no_amplitude_is_refused() {
     }
 }
 
+#[test]
+fn a_turn_by_exactly_half_a_period_counts_no_period() {
+    let half_turns = |period: Period, from: Envelope<f64>, to: Envelope<f64>| {
+        let mut state = AngleState::default();
+        tracker(period).step(&mut state, &from);
+        tracker(period).step(&mut state, &to).periods
+    };
+    // ±90° of 360°, and ±45° of 180°: exact in floating point
+    let (up, down) = (Envelope::new(0.0, 0.0, 1.0, 0.0), Envelope::new(0.0, 0.0, -1.0, 0.0));
+    assert_eq!((half_turns(Period::FullTurn, up, down), half_turns(Period::FullTurn, down, up)), (0, 0));
+    let (rising, falling) = (Envelope::new(1.0, 0.0, 1.0, 0.0), Envelope::new(1.0, 0.0, -1.0, 0.0));
+    assert_eq!((half_turns(Period::Pattern, rising, falling), half_turns(Period::Pattern, falling, rising)), (0, 0));
+}
+
+#[test]
+fn a_vibration_has_a_direction_above_the_least_amplitude() {
+    let status = |period, x: f64, y: f64| {
+        let angle = PatternAngle::new(period, 0.5).expect("valid");
+        angle.step(&mut AngleState::default(), &Envelope::new(x, 0.0, y, 0.0)).status
+    };
+    for period in [Period::Pattern, Period::FullTurn] {
+        for (x, y) in [(0.51, 0.0), (0.0, 0.51), (-0.4, 0.4), (3.0, 0.0), (0.0, 3.0)] {
+            assert_eq!(status(period, x, y), Status::Valid, "{x} {y}");
+        }
+        for (x, y) in [(0.5, 0.0), (0.0, 0.5), (0.3, 0.3), (0.0, 0.0)] {
+            assert_eq!(status(period, x, y), Status::Undetermined, "{x} {y}");
+        }
+        // too large for its square
+        assert_eq!(status(period, 1e200, 1e-9), Status::Invalid);
+    }
+}
+
+#[test]
+fn an_orbit_too_small_for_its_squares_has_no_direction_of_its_axis() {
+    let e = Envelope::new(1e-85, 0.0, 0.0, 0.0);
+    let direction = major_axis(&e, &e.pendulum());
+    assert_eq!((direction.cos, direction.sin, direction.status), (1.0, 0.0, Status::Undetermined));
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_finite_reading_inside_its_period(

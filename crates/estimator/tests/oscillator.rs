@@ -41,6 +41,70 @@ fn a_loop_that_the_period_cannot_realise_is_refused() {
     assert!(PhaseLock::new(60.0, 1.0, PERIOD_S, f64::INFINITY).is_err());
 }
 
+/// The pendulum variables of energy 1.6 V² with the error −L/(2E).
+fn with_error(error: f64) -> Pendulum<f64> {
+    Pendulum { e: 1.6, l: -2.0 * 1.6 * error, ..Pendulum::default() }
+}
+
+#[test]
+fn a_step_is_the_gain_times_the_error_and_the_sum_of_the_errors() {
+    // K = 2ζω = 90 1/s, and ω²T = 1.8 1/s a step
+    let lock = PhaseLock::new(60.0, 0.75, PERIOD_S, LIMIT_RAD_S).expect("valid");
+    let (mut state, mut sum) = (LockState { detuning_rad_s: 7.0 }, 7.0);
+    for error in [0.1, -0.25, 0.4, 0.9, -1.0, 1.0] {
+        sum += 1.8 * error;
+        let correction = lock.step(&mut state, &with_error(error));
+        assert_abs_diff_eq!(correction.rad_s, 90.0 * error + sum, epsilon = 1e-12);
+        assert_abs_diff_eq!(state.detuning_rad_s, sum, epsilon = 1e-12);
+        assert_eq!(correction.status, Status::Valid);
+    }
+}
+
+#[test]
+fn at_the_limit_the_correction_and_its_integral_part_are_the_limit_each() {
+    let step = |held: f64, error: f64| {
+        let mut state = LockState { detuning_rad_s: held };
+        let correction = lock().step(&mut state, &with_error(error));
+        assert_eq!(correction.status, Status::Valid);
+        (correction.rad_s, state.detuning_rad_s)
+    };
+    for sign in [1.0, -1.0] {
+        // K = 120 1/s, ω²T = 1.8 1/s a step: 590 + 48 is beyond 600
+        let (rad_s, detuning) = step(sign * 590.0, sign * 0.4);
+        assert_eq!(rad_s, sign * LIMIT_RAD_S);
+        assert_abs_diff_eq!(detuning, sign * (590.0 + 1.8 * 0.4), epsilon = 1e-12);
+        assert_eq!(step(sign * 599.9, sign * 0.5), (sign * LIMIT_RAD_S, sign * LIMIT_RAD_S));
+        // a state beyond the limit counts as the limit
+        let (rad_s, detuning) = step(sign * 700.0, sign * -0.1);
+        assert_abs_diff_eq!(detuning, sign * (600.0 - 0.18), epsilon = 1e-12);
+        assert_abs_diff_eq!(rad_s, sign * (600.0 - 0.18 - 12.0), epsilon = 1e-12);
+    }
+}
+
+#[test]
+fn what_holds_no_phase_holds_the_integral_and_says_why() {
+    let step = |p: Pendulum<f64>| {
+        let mut state = LockState { detuning_rad_s: 5.0 };
+        let correction = lock().step(&mut state, &p);
+        assert_eq!((correction.rad_s, state.detuning_rad_s), (5.0, 5.0));
+        correction.status
+    };
+    // |L| is E at most: twice that is no measurement, and neither is any at rest
+    assert_eq!(step(with_error(1.01)), Status::Undetermined);
+    assert_eq!(step(with_error(-1.01)), Status::Undetermined);
+    assert_eq!(step(Pendulum { l: 1.0, ..Pendulum::default() }), Status::Undetermined);
+    assert_eq!(step(Pendulum { l: f64::NAN, ..with_error(0.1) }), Status::Invalid);
+    assert_eq!(step(Pendulum { e: f64::NAN, ..with_error(0.1) }), Status::Invalid);
+}
+
+#[test]
+fn the_fastest_loop_that_a_period_realises_is_just_below_one() {
+    let new = |bandwidth: f64, damping: f64| PhaseLock::new(bandwidth, damping, 1.0 / 2048.0, 1.0).map(|_| ());
+    assert!(new(1023.9, 1.0).is_ok() && new(2047.9, 0.5).is_ok());
+    assert_eq!(new(1024.0, 1.0).map_err(|e| e.parameter), Err("bandwidth_rad_s"));
+    assert_eq!(new(2048.0, 0.5).map_err(|e| e.parameter), Err("bandwidth_rad_s"));
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_correction_within_the_limit(e: u64, l: u64, held: u64) {

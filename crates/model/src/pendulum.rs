@@ -149,7 +149,7 @@ impl<T: Real> Envelope<T> {
         T::half() * (p.r * d.s - p.s * d.r) / (p.r * p.r + p.s * p.s)
     }
 
-    /// The ellipse of this envelope. Phase δ is in (−90°, 90°], θ in (−180°, 180°] such that the major axis carries
+    /// The ellipse of this envelope. Phase δ is in [−90°, 90°], θ in (−180°, 180°] such that the major axis carries
     /// the in-phase vibration; a circular orbit (R = S = 0) gives θ = 0.
     ///
     /// Inverse of [`Orbit::envelope`].

@@ -1,0 +1,127 @@
+//! Interruptions and faults: what coasts, what ends, what is tried again.
+
+use super::*;
+
+#[test]
+fn a_window_without_a_measurement_coasts_in_every_mode_and_has_a_cause() {
+    let modes = [Mode::Listen, Mode::Sweep, Mode::Lock, Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown];
+    for mode in modes {
+        let (after, orders) = step(in_mode(mode, 2), &invalid());
+        assert_eq!((after.mode, after.windows, orders), (Mode::Coast, 0, Orders::Rest));
+        assert_eq!((after.cause, after.coasts), (Some(Fault::InvalidSamples), 1));
+    }
+}
+
+#[test]
+fn a_pattern_that_jumps_in_operation_coasts_with_a_dead_channel_as_cause() {
+    let jumped = Observation { jumped: true, ..well() };
+    for mode in [Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        let (after, orders) = step(in_mode(mode, FORGET + 5), &jumped);
+        assert_eq!((after.mode, after.cause, orders), (Mode::Coast, Some(Fault::DeadChannel), Orders::Rest));
+    }
+    // a pattern that is not yet controlled may
+    assert_eq!(becomes(in_mode(Mode::SpinUp, 2), &jumped), (Mode::SpinUp, None, RUN));
+}
+
+#[test]
+fn the_fifty_first_interruption_is_a_fault() {
+    let before = |coasts| SupervisorState { coasts, ..in_mode(Mode::WholeAngle, 2) };
+    assert_eq!(becomes(before(49), &invalid()), (Mode::Coast, None, Orders::Rest));
+    let (after, orders) = step(before(50), &invalid());
+    assert_eq!((after.fault_now(), after.coasts, orders), (Some(Fault::InvalidSamples), 0, Orders::Rest));
+}
+
+#[test]
+fn two_windows_in_a_row_end_a_coast_in_a_lock_or_in_listening() {
+    let (one, orders) = step(in_mode(Mode::Coast, 2), &well());
+    assert_eq!((one.mode, one.good, orders), (Mode::Coast, 1, Orders::Rest));
+    assert_eq!(step(one, &invalid()).0.good, 0);
+    assert_eq!(becomes(one, &well()), (Mode::Lock, None, Orders::Snap));
+    assert_eq!(becomes(one, &energy(LEAST)), (Mode::Lock, None, Orders::Snap));
+    assert_eq!(becomes(one, &energy(0.99 * LEAST)), (Mode::Listen, None, Orders::Rest));
+}
+
+#[test]
+fn a_coast_that_lasts_is_the_fault_that_caused_it() {
+    let coasting = |cause, windows| SupervisorState { cause, ..in_mode(Mode::Coast, windows) };
+    let jumped = Some(Fault::DeadChannel);
+    assert_eq!(becomes(coasting(jumped, COAST - 2), &invalid()), (Mode::Coast, None, Orders::Rest));
+    assert_eq!(becomes(coasting(jumped, COAST - 1), &invalid()), fault(Fault::DeadChannel));
+    assert_eq!(becomes(coasting(None, COAST - 1), &invalid()), fault(Fault::InvalidSamples));
+}
+
+#[test]
+fn a_converter_that_repeats_itself_twenty_times_in_a_row_is_stuck() {
+    let repeated = Observation { repeats: true, ..well() };
+    for mode in [Mode::Listen, Mode::WholeAngle, Mode::Coast] {
+        let before = |repeats| SupervisorState { repeats, ..in_mode(mode, 1) };
+        let (after, _) = step(before(IN_A_ROW - 2), &repeated);
+        assert_eq!((after.fault_now(), after.repeats), (None, IN_A_ROW - 1));
+        assert_eq!(becomes(before(IN_A_ROW - 1), &repeated), fault(Fault::StuckChannel));
+        assert_eq!(step(before(IN_A_ROW - 1), &well()).0.repeats, 0);
+    }
+}
+
+#[test]
+fn a_converter_at_the_end_of_its_range_is_endured_for_its_time() {
+    let clipped = Observation { clipped: true, ..well() };
+    for mode in [Mode::Listen, Mode::WholeAngle, Mode::Coast] {
+        let before = |clipped| SupervisorState { clipped, ..in_mode(mode, 1) };
+        let (after, _) = step(before(ENDURE - 2), &clipped);
+        assert_eq!((after.fault_now(), after.clipped), (None, ENDURE - 1));
+        assert_eq!(becomes(before(ENDURE - 1), &clipped), fault(Fault::Saturated));
+        assert_eq!(step(before(ENDURE - 1), &well()).0.clipped, ENDURE - 2);
+    }
+}
+
+#[test]
+fn after_a_rest_the_start_is_tried_again_as_often_as_is_set() {
+    let fallen = |starts, windows| SupervisorState {
+        starts,
+        sweeps: 3,
+        fault: Some(Fault::NoLock),
+        ..in_mode(Mode::Fault, windows)
+    };
+    assert_eq!(becomes(fallen(0, REST - 2), &well()), fault(Fault::NoLock));
+    for starts in 0..2 {
+        let (after, orders) = step(fallen(starts, REST - 1), &well());
+        assert_eq!((after.mode, after.starts, after.sweeps, orders), (Mode::Listen, starts + 1, 0, Orders::Rest));
+        assert_eq!((after.fault, after.fault_now()), (Some(Fault::NoLock), None), "it is remembered, not in force");
+    }
+    assert_eq!(becomes(fallen(2, REST - 1), &well()), fault(Fault::NoLock));
+    assert_eq!(becomes(fallen(0, REST + 7), &invalid()), fault(Fault::NoLock), "not without a measurement");
+}
+
+#[test]
+fn a_converter_that_is_stuck_is_not_started() {
+    let stuck =
+        |repeats| SupervisorState { repeats, fault: Some(Fault::StuckChannel), ..in_mode(Mode::Fault, REST + 3) };
+    let repeated = Observation { repeats: true, ..well() };
+    assert_eq!(becomes(stuck(IN_A_ROW - 2), &repeated).0, Mode::Listen);
+    assert_eq!(becomes(stuck(IN_A_ROW - 1), &repeated), fault(Fault::StuckChannel));
+    assert_eq!(becomes(stuck(400), &well()).0, Mode::Listen, "as soon as it moves");
+}
+
+#[test]
+fn the_wish_for_rest_turns_everything_off_and_keeps_the_name_of_the_fault() {
+    for mode in [Mode::Listen, Mode::Sweep, Mode::WholeAngle, Mode::Hold, Mode::Coast, Mode::Fault] {
+        let before = SupervisorState {
+            wish: Wish::Off,
+            fault: Some(Fault::NoLock),
+            starts: 2,
+            sweeps: 1,
+            good: 4,
+            ..in_mode(mode, 7)
+        };
+        let (after, orders) = step(before, &well());
+        let expected = SupervisorState { wish: Wish::Off, fault: Some(Fault::NoLock), ..SupervisorState::default() };
+        assert_eq!((after, orders), (expected, Orders::Rest));
+    }
+}
+
+#[test]
+fn a_fault_is_in_force_in_the_mode_of_fault_only() {
+    let remembered = SupervisorState { fault: Some(Fault::NoLock), ..in_mode(Mode::WholeAngle, 3) };
+    assert_eq!(remembered.fault_now(), None);
+    assert_eq!(SupervisorState { mode: Mode::Fault, ..remembered }.fault_now(), Some(Fault::NoLock));
+}

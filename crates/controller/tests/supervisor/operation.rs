@@ -1,0 +1,132 @@
+//! Operation: its modes, its bounds, and what is forgotten.
+
+use super::*;
+
+#[test]
+fn each_mode_of_operation_has_its_orders() {
+    for (mode, orders) in [(Mode::WholeAngle, RUN), (Mode::Hold, RUN_HELD), (Mode::RingDown, RUN_DOWN)] {
+        assert_eq!(becomes(in_mode(mode, 3), &well()), (mode, None, orders));
+    }
+}
+
+#[test]
+fn a_wish_is_fulfilled_at_once_where_the_amplitude_allows() {
+    let modes = [
+        (Wish::WholeAngle, Mode::WholeAngle, RUN),
+        (Wish::Hold, Mode::Hold, RUN_HELD),
+        (Wish::RingDown, Mode::RingDown, RUN_DOWN),
+    ];
+    for (_, from, _) in modes {
+        for (wish, to, orders) in modes {
+            let before = SupervisorState { wish, ..in_mode(from, 4) };
+            assert_eq!(becomes(before, &well()), (to, None, orders), "{from:?} to {to:?}");
+            // a quarter of the set energy is enough
+            assert_eq!(becomes(before, &energy(6.25)), (to, None, orders), "{from:?} to {to:?}");
+            if from != to {
+                assert_eq!(becomes(before, &energy(6.24)), (Mode::SpinUp, None, RUN), "{from:?} to {to:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn earlier_faults_are_forgotten_after_a_time_in_which_all_was_well() {
+    let past = |mode, windows| SupervisorState {
+        starts: 2,
+        coasts: 9,
+        cause: Some(Fault::DeadChannel),
+        repeats: 3,
+        clipped: 3,
+        bad: 3,
+        ..in_mode(mode, windows)
+    };
+    for mode in [Mode::WholeAngle, Mode::Hold] {
+        let (kept, _) = step(past(mode, FORGET - 2), &well());
+        assert_eq!((kept.starts, kept.coasts, kept.cause), (2, 9, Some(Fault::DeadChannel)));
+        // one window undoes one of each count, and a converter that moves is not stuck
+        assert_eq!((kept.bad, kept.clipped, kept.repeats, kept.windows), (2, 2, 0, FORGET - 1));
+        let (forgotten, _) = step(past(mode, FORGET - 1), &well());
+        assert_eq!((forgotten.starts, forgotten.coasts, forgotten.cause), (0, 0, None));
+        // in a window that is on a bound or has a blemish not all is well
+        let mut blemishes = vec![energy(6.25), energy(56.25)];
+        blemishes.push(Observation { clipped: true, ..well() });
+        blemishes.push(Observation { repeats: true, ..well() });
+        for o in blemishes {
+            let (kept, _) = step(past(mode, FORGET + 5), &o);
+            assert_eq!((kept.mode, kept.starts, kept.coasts), (mode, 2, 9), "{o:?}");
+        }
+        // just inside of the bounds it is
+        let inside = [
+            energy(6.26),
+            energy(56.24),
+            with(|p| p.q = 12.49),
+            with(|p| p.q = -12.49),
+            with(|p| p.l = 12.49),
+            with(|p| p.l = -12.49),
+        ];
+        for o in inside {
+            assert_eq!(step(past(mode, FORGET + 5), &o).0.starts, 0, "{o:?}");
+        }
+    }
+    // a ring-down says nothing about the energy loop
+    assert_eq!(step(past(Mode::RingDown, FORGET + 5), &well()).0.starts, 2);
+}
+
+#[test]
+fn an_amplitude_or_a_quadrature_out_of_bounds_is_endured_for_its_time() {
+    let high = Observation { pendulum: Pendulum { e: 56.26, ..well().pendulum }, ..well() };
+    let round = with(|p| p.q = 12.5);
+    let opposite = with(|p| p.q = -12.5);
+    let cases = [(high, Fault::AmplitudeHigh), (round, Fault::QuadratureHigh), (opposite, Fault::QuadratureHigh)];
+    for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        for (o, name) in cases {
+            let mut state = in_mode(mode, 3);
+            for k in 1..ENDURE {
+                supervisor().step(&mut state, &o, None);
+                assert_eq!((state.mode, state.bad), (mode, k), "{o:?}");
+            }
+            // a window in bounds takes one back
+            assert_eq!(step(state, &well()).0.bad, ENDURE - 2, "{mode:?}");
+            assert_eq!(becomes(state, &o), fault(name), "{mode:?}");
+        }
+    }
+}
+
+#[test]
+fn an_amplitude_up_to_one_and_a_half_times_its_set_value_is_in_bounds() {
+    for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        for e in [30.0, 50.0, 56.25] {
+            let (after, _) = step(SupervisorState { bad: 3, ..in_mode(mode, 3) }, &energy(e));
+            assert_eq!((after.mode, after.bad), (mode, 2), "{e}");
+        }
+    }
+}
+
+#[test]
+fn an_amplitude_below_half_is_endured_for_its_time_but_in_a_ring_down() {
+    for mode in [Mode::WholeAngle, Mode::Hold] {
+        let mut state = in_mode(mode, 3);
+        for k in 1..ENDURE {
+            supervisor().step(&mut state, &energy(6.24), None);
+            assert_eq!((state.mode, state.bad), (mode, k));
+        }
+        assert_eq!(becomes(state, &energy(6.25)).0, mode);
+        assert_eq!(becomes(state, &energy(6.24)), fault(Fault::AmplitudeLow));
+    }
+    for mode in [Mode::SpinUp, Mode::RingDown] {
+        let before = SupervisorState { bad: ENDURE - 1, ..in_mode(mode, 3) };
+        let (after, _) = step(before, &energy(6.24));
+        assert_eq!((after.mode, after.bad), (mode, ENDURE - 2));
+    }
+}
+
+#[test]
+fn a_phase_error_of_half_the_energy_locks_anew() {
+    for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        for l in [12.5, -12.5] {
+            let locked = becomes(in_mode(mode, 3), &with(|p| p.l = l));
+            assert_eq!(locked, (Mode::Lock, None, Orders::Snap), "{mode:?}");
+        }
+        assert_eq!(becomes(in_mode(mode, 3), &with(|p| p.l = 12.49)).0, mode);
+    }
+}

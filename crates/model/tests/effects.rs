@@ -1,0 +1,279 @@
+//! Each effect by its definition, at one vibration with in-phase and quadrature parts in both channels, and undone.
+
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use approx::assert_abs_diff_eq;
+use cvg_model::effects::harmonic_n::factor;
+use cvg_model::effects::{Description, Effect, EffectId, Moment, Role, Scaling, Search, Stage, Values};
+use cvg_model::{AxisForces, Envelope, Orbit, Real};
+
+const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 0.3 };
+
+fn now() -> Moment<f64> {
+    Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4 }
+}
+
+#[track_caller]
+fn assert_near(got: Envelope<f64>, expected: Envelope<f64>) {
+    let error = (got - expected).pendulum().e.sqrt();
+    assert!(error < 1e-14, "{got:?} and not {expected:?}");
+}
+
+/// The readout is as defined, and undone to within `left`.
+#[track_caller]
+fn reads(id: EffectId, values: Values<f64>, expected: Envelope<f64>, left: f64) {
+    let read = id.read(&values, VIBRATION, &now());
+    assert_near(read, expected);
+    let back = id.unread(&values, read, &now());
+    assert!((back - VIBRATION).pendulum().e.sqrt() <= left, "{id}: {back:?}");
+}
+
+#[test]
+fn drives_act_on_both_phases_alike() {
+    let f = AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.0, y_s: 0.25 };
+    // gains of 2 and ½
+    let uneven = EffectId::ActuationGainMismatch.actuate(&[4.0, 0.0, 0.0, 0.0], f);
+    assert_eq!(uneven, AxisForces { x_c: 1.0, x_s: -4.0, y_c: 1.5, y_s: 0.125 });
+    let skewed = EffectId::ActuationSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f);
+    assert_eq!(skewed, AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.25, y_s: -0.75 });
+    assert_eq!(EffectId::DetectionSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f), f, "a readout makes no forces");
+}
+
+#[test]
+fn linear_readouts_are_their_matrices_and_offsets() {
+    let Envelope { x_c, x_s, y_c, y_s } = VIBRATION;
+    let gain = |g: f64| Envelope::new(x_c, x_s, g * y_c, g * y_s);
+    reads(EffectId::DetectionGainMismatch, [1.25, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
+    // 1 + 0.1 · 2.5 s
+    reads(EffectId::GainDrift, [0.1, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
+    let skewed = Envelope::new(x_c, x_s, y_c + 0.5 * x_c, y_s + 0.5 * x_s);
+    reads(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0], skewed, 1e-15);
+    let offset = Envelope::new(x_c + 0.1, x_s, y_c - 0.3, y_s);
+    reads(EffectId::DetectionOffset, [0.1, -0.3, 0.0, 0.0], offset, 1e-15);
+}
+
+#[test]
+fn a_cubic_readout_grows_with_the_square_of_each_channel() {
+    let Envelope { x_c, x_s, y_c, y_s } = VIBRATION;
+    // κ ± δκ, |X|² = 0.4 and |Y|² = 0.34
+    let (x, y) = (1.0 + 0.75 * 0.25 * 0.4, 1.0 + 0.75 * 0.15 * 0.34);
+    let cubed = Envelope::new(x * x_c, x * x_s, y * y_c, y * y_s);
+    reads(EffectId::DetectionCubic, [0.2, 0.05, 0.0, 0.0], cubed, 1e-9);
+    // a readout that bends the other way, at its limit of a tenth
+    let back = |kappa: f64, a: f64| {
+        let e = Envelope::new(a, 0.0, 0.0, a);
+        let v = [kappa, 0.0, 0.0, 0.0];
+        (EffectId::DetectionCubic.unread(&v, EffectId::DetectionCubic.read(&v, e, &now()), &now()) - e)
+            .pendulum()
+            .e
+            .sqrt()
+    };
+    assert!(back(-0.1, 1.0) < 1e-12 && back(0.12, 1.0) < 1e-13 && back(-0.02, 2.0) < 1e-12);
+    // strong ones take more than one step and are still found
+    assert!(back(1.0, 1.0) < 2e-4, "{}", back(1.0, 1.0));
+    // where no vibration gives the readout the answer is finite
+    let beyond = EffectId::DetectionCubic.unread(&[-1e3, 0.0, 0.0, 0.0], VIBRATION, &now());
+    assert!(beyond.pendulum().e.is_finite());
+    // past the turning point, here with ¾κm² = −0.3, Newton's first step stays: (1 − 0.9 + 0.3)/(1 − 0.9)
+    let past = EffectId::DetectionCubic.unread(&[-0.4, 0.0, 0.0, 0.0], Envelope::new(1.0, 0.0, 0.0, 0.0), &now());
+    assert_near(past, Envelope::new(4.0, 0.0, 0.0, 0.0));
+    // and where even that would divide by zero, at −1/3, the readout stays
+    let along_x = Envelope::new(1.0, 0.0, 0.0, 0.0);
+    assert_eq!(EffectId::DetectionCubic.unread(&[-4.0 / 9.0, 0.0, 0.0, 0.0], along_x, &now()), along_x);
+}
+
+#[test]
+fn a_clipped_carrier_is_scaled_by_its_describing_function() {
+    let gain = |drive: f64, x: bool| {
+        let e = if x { Envelope::new(0.0, drive, 0.1, 0.0) } else { Envelope::new(0.0, 0.1, 0.6 * drive, 0.8 * drive) };
+        let read = EffectId::DetectionSaturation.read(&[1.0, 0.0, 0.0, 0.0], e, &now());
+        let back = EffectId::DetectionSaturation.unread(&[1.0, 0.0, 0.0, 0.0], read, &now());
+        assert!((back - e).pendulum().e.sqrt() < if drive > 5.0 { 1e-7 } else { 1e-9 }, "{drive}: {back:?}");
+        let (p, through) = (read, |c: f64, s: f64| c.hypot(s) / drive);
+        if x { through(p.x_c, p.x_s) } else { through(p.y_c, p.y_s) }
+    };
+    for x in [true, false] {
+        for drive in [0.2, 0.99, 1.0] {
+            assert_abs_diff_eq!(gain(drive, x), 1.0, epsilon = 1e-15);
+        }
+        for drive in [1.01, 1.2, 1.5, 2.0, 3.0, 6.0] {
+            let r = 1.0 / drive;
+            assert_abs_diff_eq!(gain(drive, x), 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt()), epsilon = 1e-14);
+        }
+    }
+    // beyond 4/π of the clip level there is no vibration: the largest drive that is considered, of ten
+    let most = EffectId::DetectionSaturation.unread(&[1.0, 0.0, 0.0, 0.0], Envelope::new(2.0, 0.0, 0.0, 1.0), &now());
+    assert_eq!(most, Envelope::new(10.0, 0.0, 0.0, 1.0));
+}
+
+#[test]
+fn readouts_of_the_angle_turn_the_vibration() {
+    let turned = |angle: f64| VIBRATION.turned(angle.sin(), angle.cos());
+    // θ(t − t_d) of a pattern that precesses at −0.4 rad/s
+    reads(EffectId::AngleLatency, [0.25, 0.0, 0.0, 0.0], turned(0.1), 1e-15);
+    let phase = TAU * 0.37 * 2.5;
+    let disturbed = 0.2 * phase.cos() - 0.1 * phase.sin();
+    reads(EffectId::TimePeriodic, [0.37, 0.2, 0.1, 0.0], turned(disturbed), 1e-15);
+    let theta = 0.5_f64.atan2(0.6);
+    for (scaling, size) in [(0.0, 1.0), (1.0, -1.0), (2.0, -0.4), (3.0, -2.5)] {
+        let error = size * (0.01 * (3.0 * theta).cos() - 0.02 * (3.0 * theta).sin());
+        reads(EffectId::HarmonicN, [3.0, 0.01, 0.02, scaling], turned(error), 1e-14);
+    }
+    // Newton's iteration ends at rounding where the harmonic is weak, and stays finite where it folds
+    let weak = [5.0, 0.01, -0.01, 0.0];
+    let back = EffectId::HarmonicN.unread(&weak, EffectId::HarmonicN.read(&weak, VIBRATION, &now()), &now());
+    assert_near(back, VIBRATION);
+    let folded = EffectId::HarmonicN.unread(&[720.0, 0.5, 0.5, 0.0], VIBRATION, &now());
+    assert_abs_diff_eq!(folded.pendulum().e, VIBRATION.pendulum().e, epsilon = 1e-14);
+    // where the angle stands still under the harmonic there is no step: 1 − 2 · ½ = 0
+    let along_x = Envelope::new(1.0, 0.0, 0.0, 0.0);
+    assert_eq!(EffectId::HarmonicN.unread(&[2.0, 0.1, 0.5, 0.0], along_x, &now()), along_x);
+}
+
+#[test]
+fn a_harmonic_scales_with_the_rate_as_it_is_told() {
+    for (scaling, of_minus_two, of_four, at_rest) in
+        [(0.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, 0.0), (2.0, -2.0, 4.0, 0.0), (3.0, -0.5, 0.25, 0.0)]
+    {
+        let got = [-2.0, 4.0, 0.0].map(|rate| factor(scaling, rate));
+        assert_eq!(got, [of_minus_two, of_four, at_rest], "{scaling}");
+    }
+    // what lies between two of them is the nearer one, and halfway the next
+    for (between, as_if) in [(0.49, 0.0), (0.5, 1.0), (1.49, 1.0), (1.5, 2.0), (2.49, 2.0), (2.5, 3.0)] {
+        assert_eq!(factor(between, -2.0), factor(as_if, -2.0), "{between}");
+    }
+}
+
+#[test]
+fn the_input_rate_is_what_reaches_the_resonator() {
+    let rate = |id: EffectId, values| id.input_rate(&values, 3.0, &now());
+    let ripple = 0.1 * 1.4_f64.cos() - 0.2 * 1.4_f64.sin();
+    assert_abs_diff_eq!(rate(EffectId::TableHarmonic, [2.0, 0.1, 0.2, 0.0]), 3.0 * (1.0 + ripple), epsilon = 1e-15);
+    assert_abs_diff_eq!(rate(EffectId::RateOffset, [0.05, 0.0, 0.0, 0.0]), 3.05, epsilon = 1e-15);
+    assert_abs_diff_eq!(rate(EffectId::ScaleDrift, [0.02, 0.0, 0.0, 0.0]), 3.15, epsilon = 1e-15);
+    assert_eq!(rate(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0]), 3.0, "a readout leaves it");
+}
+
+#[test]
+fn the_mechanics_move_the_envelope_as_averaged() {
+    let Envelope { x_c, x_s, y_c, y_s } = VIBRATION;
+    let (c, s) = (0.3, -0.4);
+    let damped = Envelope::new(
+        -0.5 * (c * x_c + s * y_c),
+        -0.5 * (c * x_s + s * y_s),
+        -0.5 * (s * x_c - c * y_c),
+        -0.5 * (s * x_s - c * y_s),
+    );
+    assert_near(EffectId::Anisodamping.mechanics(&[c, s, 0.0, 0.0], &VIBRATION), damped);
+    // i(x_c − i x_s) = x_s + i x_c: the same a quarter of a period ahead
+    let sprung = Envelope::new(damped.x_s, -damped.x_c, damped.y_s, -damped.y_c);
+    assert_near(EffectId::Anisoelasticity.mechanics(&[c, s, 0.0, 0.0], &VIBRATION), sprung);
+    assert_eq!(EffectId::DetectionSkew.mechanics(&[c, 0.0, 0.0, 0.0], &VIBRATION), Envelope::zero());
+}
+
+#[test]
+fn a_cubic_spring_precesses_at_four_times_the_angle() {
+    for theta in [0.1, 0.4, 1.0, -0.7, FRAC_PI_2] {
+        let e = Orbit { a: 0.8, q: 0.1, theta, delta: 0.2 }.envelope();
+        let rate = EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &e);
+        let expected = 0.3 * (4.0 * theta).sin() - 0.2 * (4.0 * theta).cos();
+        assert_abs_diff_eq!(e.precession(&rate), expected, epsilon = 1e-14);
+        assert_abs_diff_eq!(e.pendulum_rate(&rate).e, 0.0, epsilon = 1e-15);
+    }
+    for no_orientation in [Envelope::zero(), Envelope::new(1.0, 0.0, 0.0, 1.0)] {
+        assert_eq!(EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &no_orientation), Envelope::zero());
+    }
+}
+
+#[test]
+fn parameters_have_their_roles_and_neutral_values() {
+    let roles = |id: EffectId| id.description().parameters.iter().map(|p| p.role).collect::<Vec<_>>();
+    assert_eq!(roles(EffectId::DetectionCubic), [Role::Fitted, Role::Refined]);
+    let table = Role::Searched(Search::TableOrder { explained_to: 8 });
+    assert_eq!(roles(EffectId::TableHarmonic), [table, Role::Fitted, Role::Fitted]);
+    assert_eq!(roles(EffectId::TimePeriodic), [Role::Located(Search::Frequency), Role::Fitted, Role::Fitted]);
+    assert_eq!(roles(EffectId::HarmonicN)[0], Role::Searched(Search::PatternHarmonic));
+    let offset = &EffectId::DetectionOffset.description().parameters[1];
+    assert_eq!((offset.lower, offset.upper, offset.neutral), (-1e3, 1e3, 0.0));
+    assert_eq!(EffectId::ActuationGainMismatch.neutral::<f64>(), [1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(EffectId::TableHarmonic.neutral::<f64>(), [0.1, 0.0, 0.0, 0.0]);
+    for &id in EffectId::ALL {
+        assert_eq!(EffectId::from_id(id.description().id), Some(id));
+    }
+    assert_eq!(EffectId::from_id("harmonic"), None);
+}
+
+#[test]
+fn whole_low_orders_of_the_table_have_a_cause_and_what_is_empirical_has_none() {
+    let explains = |id: EffectId, first: f64| id.description().explains(&[first, 0.0, 0.0, 0.0]);
+    for (order, expected) in [
+        (1.0, true),
+        (8.0, true),
+        (9.0, false),
+        (8.0 + 1e-7, false),
+        (2.5, false),
+        (3.0 + 9e-7, true),
+        (3.0 - 9e-7, true),
+        (3.0 + 2e-6, false),
+        (3.0 - 2e-6, false),
+        (1e-6, false),
+    ] {
+        assert_eq!(explains(EffectId::TableHarmonic, order), expected, "{order}");
+    }
+    assert!(explains(EffectId::DetectionSkew, 0.5));
+    assert!(!explains(EffectId::RateOffset, 0.5) && !explains(EffectId::HarmonicN, 4.0));
+}
+
+#[test]
+fn an_effect_scales_with_rate_and_amplitude_as_where_it_acts_says() {
+    for &id in EffectId::ALL {
+        let Description { stage, scaling, .. } = id.description();
+        // what moves the pattern has the longer to do so the slower it turns
+        let rate = match (stage, id) {
+            (Stage::Mechanics | Stage::Actuation, _) => -1,
+            (_, EffectId::AngleLatency) => 1,
+            _ => 0,
+        };
+        let amplitude = match id {
+            EffectId::DetectionCubic | EffectId::DetectionSaturation => 2,
+            EffectId::DetectionOffset => -1,
+            _ => 0,
+        };
+        assert_eq!((scaling.rate, scaling.amplitude), (rate, amplitude), "{id}");
+    }
+}
+
+/// An effect that leaves its inverse to the trait: Y sees a part of X's square.
+struct Bent;
+
+impl Effect for Bent {
+    const DESCRIPTION: Description = Description {
+        id: "bent",
+        title: "bent axes",
+        stage: Stage::Readout,
+        declared: false,
+        empirical: false,
+        in_sensors: false,
+        parameters: &[],
+        onsets: &[],
+        shown: &[],
+        signature: "none",
+        scaling: Scaling { rate: 0, amplitude: 1, odd_in_rate: false },
+        source: "this test",
+    };
+
+    fn read<T: Real>(&[bend, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
+        Envelope::new(e.x_c + bend * e.y_c * e.y_c, e.x_s, e.y_c + bend * e.x_c * e.x_c, e.y_s)
+    }
+}
+
+#[test]
+fn an_effect_without_an_inverse_of_its_own_is_undone_step_by_step() {
+    let bend = [0.02, 0.0, 0.0, 0.0];
+    let back = Bent::unread(&bend, Bent::read(&bend, VIBRATION, &now()), &now());
+    // each of eight steps leaves a fiftieth
+    assert!((back - VIBRATION).pendulum().e.sqrt() < 1e-13, "{back:?}");
+    // what it doesn't act on it leaves
+    assert_eq!(Bent::mechanics(&bend, &VIBRATION), Envelope::zero());
+    assert_eq!(Bent::input_rate(&bend, 3.0, &now()), 3.0);
+}
