@@ -49,6 +49,13 @@ pub fn quadrature_control<T: Real>(gain: T, integration_time_s: T, quadrature: T
     -law(gain, integration_time_s, quadrature, integral)
 }
 
+/// How a controller's output goes with its integral.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sense {
+    With,
+    Against,
+}
+
 /// A discrete PI, K[e + (1/2τ)∫e dt], with a limit and without wind-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pi<T> {
@@ -141,19 +148,19 @@ impl<T: Float> Pi<T> {
     /// The energy controller's command v_as for measured energy `e_d` and set point `e_0`, V².
     #[inline]
     pub fn energy(&self, state: &mut PiState<T>, e_d: T, e_0: T) -> Command<T> {
-        self.step(state, e_d - e_0, energy_control)
+        self.step(state, e_d - e_0, energy_control, Sense::With)
     }
 
     /// The quadrature controller's command v_qc for measured quadrature `q_d`, V².
     #[inline]
     pub fn quadrature(&self, state: &mut PiState<T>, q_d: T) -> Command<T> {
-        self.step(state, q_d, quadrature_control)
+        self.step(state, q_d, quadrature_control, Sense::Against)
     }
 
     /// The command +K[e + (1/2τ)∫e dt] of a loop on any error `e`.
     #[inline]
     pub fn control(&self, state: &mut PiState<T>, e: T) -> Command<T> {
-        self.step(state, e, law)
+        self.step(state, e, law, Sense::With)
     }
 
     //= specs/equation-03.md#integral-part
@@ -166,14 +173,14 @@ impl<T: Float> Pi<T> {
     //# A finite error MUST be answered by the law or by the limit whatever the state was before.
     /// One sample of `controller` on the error `e`: proportional part of this sample, integral up to and including it.
     ///
-    /// The integral stops growing where the command is limited and the error would push it further (conditional
-    /// integration), and alone never commands more than the limit. Total: an error that is not a number leaves the
+    /// Where the command is limited the integral moves back only, in the sense in which the command goes with it
+    /// (conditional integration), and alone never commands more than the limit. Total: an error that is not a number leaves the
     /// integral part alone.
     #[inline]
-    fn step(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T) -> Command<T> {
+    fn step(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T, sense: Sense) -> Command<T> {
         match self.step_within(state, e, &controller) {
             Some(volts) => Command { volts, status: Status::Within },
-            None => self.beyond(state, e, controller),
+            None => self.beyond(state, e, controller, sense),
         }
     }
 
@@ -193,7 +200,7 @@ impl<T: Float> Pi<T> {
     /// The step where the command or the integral does not stay within its limit, or something is not a number.
     #[cold]
     #[inline(never)]
-    fn beyond(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T) -> Command<T> {
+    fn beyond(&self, state: &mut PiState<T>, e: T, controller: impl Fn(T, T, T, T) -> T, sense: Sense) -> Command<T> {
         let command = |e: T, integral: T| controller(self.gain, self.integration_time_s, e, integral);
         let held = state.integral.bounded(self.integral_limit);
         let integral = (held + self.period_s * e).bounded(self.integral_limit);
@@ -202,8 +209,9 @@ impl<T: Float> Pi<T> {
             state.integral = integral;
             Command { volts: asked, status: Status::Within }
         } else if asked.magnitude() > self.limit_v {
-            let outward = asked.magnitude() >= command(e, held).magnitude();
-            state.integral = if outward { held } else { integral };
+            let outward_is_up = (asked > T::zero()) == (sense == Sense::With);
+            let is_inward = if outward_is_up { integral < held } else { integral > held };
+            state.integral = if is_inward { integral } else { held };
             Command { volts: asked.bounded(self.limit_v), status: Status::Limited }
         } else {
             state.integral = held;

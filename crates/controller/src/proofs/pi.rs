@@ -111,3 +111,41 @@ pub fn proof_pi_answers_a_finite_error_f32() {
 pub fn twin_pi_answers_a_finite_error_f32() {
     error_is_answered(|_: f32| true);
 }
+
+/// `is_outward(after, before)`: the integral moved upward where the output is at the limit to which that would drive it.
+fn does_not_wind_up<T: Float + Arbitrary>(is_outward: impl Fn(T, T) -> bool) {
+    let (pi, limit_v) = any_controller::<T>();
+    let mut state: PiState<T> = PiState { integral: kani::any() };
+    // what the step takes the integral as
+    let before = state.integral.bounded(pi.integral_limit);
+    let (command, against) = match kani::any::<u8>() {
+        0 => (pi.energy(&mut state, kani::any(), kani::any()), false),
+        1 => (pi.quadrature(&mut state, kani::any()), true),
+        _ => (pi.control(&mut state, kani::any()), false),
+    };
+    if command.status == Status::Limited {
+        let is_high = (command.volts == limit_v) != against;
+        kani::cover!(is_high && state.integral < before, "let back from the upper limit");
+        kani::cover!(!is_high && state.integral == before, "held at the lower limit");
+        let grown = if is_high { is_outward(state.integral, before) } else { is_outward(before, state.integral) };
+        assert!(!grown);
+    }
+}
+
+//= specs/equation-03.md#no-windup
+//# The integral MUST NOT grow in the direction in which the output is at its limit.
+/// Where the output of [`Pi::energy`], [`Pi::quadrature`] or [`Pi::control`] is at its limit, the integral is not further in the
+/// direction of that limit than before, for any bits of input and state.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_pi_does_not_wind_up_f32() {
+    does_not_wind_up(|after: f32, before: f32| after > before);
+}
+
+/// It is claimed not to go back either.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_pi_does_not_wind_up_f32() {
+    does_not_wind_up(|after: f32, before: f32| after != before);
+}
