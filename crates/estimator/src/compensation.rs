@@ -65,7 +65,8 @@ impl<T: Float, const N: usize> Compensation<T, N> {
         let form = |(id, values): &(EffectId, Values<T>)| id.inverse(values);
         let used = effects.len();
         let affine = sorted.effects().rev().take_while(|e| form(e) == Inverse::Affine).count();
-        sorted.affine = Affine::undoing(sorted.effects().rev().take(affine));
+        let undoing = Affine::undoing(&sorted.effects().rev().take(affine));
+        sorted.affine = undoing;
         sorted.left = used.saturating_sub(affine);
         let before = sorted.effects().rev().nth(affine).map(form);
         if let Some(Inverse::Cubic(cubic)) = before {
@@ -122,7 +123,7 @@ impl<T: Float, const N: usize> Compensation<T, N> {
 
 impl<T: Float> Affine<T> {
     /// What undoes `effects`, in this order. Found in double precision, so that an offset does not round the matrix.
-    fn undoing<'a>(effects: impl Iterator<Item = &'a (EffectId, Values<T>)> + Clone) -> Self
+    fn undoing<'a>(effects: &(impl Iterator<Item = &'a (EffectId, Values<T>)> + Clone)) -> Self
     where
         T: 'a,
     {

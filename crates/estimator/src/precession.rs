@@ -106,7 +106,8 @@ impl<T: Float> Precession<T> {
     pub fn step_steadily(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> bool {
         let line = p.r.norm(p.s);
         // false for NaN
-        if !(line > self.least_2) {
+        let directed = line > self.least_2;
+        if !directed {
             return false;
         }
         let scale = T::one() / line;

@@ -88,8 +88,7 @@ proptest! {
         let one_by_one = chain.iter().rev().fold(seen, |e, (id, values)| id.unread(values, e, &at));
         let at_once = compensation.apply(seen, &at);
         let size = one_by_one.pendulum().e.sqrt().max(1.0);
-        // NaN where one is NaN
-        prop_assert!(!(distance(&at_once, &one_by_one) > 1e-13 * size), "{:?}: {:?}, {:?}", chain, at_once, one_by_one);
+        prop_assert!(distance(&at_once, &one_by_one) <= 1e-13 * size, "{:?}: {:?}, {:?}", chain, at_once, one_by_one);
         prop_assert_eq!(compensation.apply_at(seen, || at), at_once);
         let single: Vec<_> = chain.iter().map(|(id, values)| (*id, values.map(|v| v as f32))).collect();
         let narrow = |e: Envelope<f64>| Envelope::new(e.x_c as f32, e.x_s as f32, e.y_c as f32, e.y_s as f32);
@@ -130,15 +129,16 @@ proptest! {
     }
 
     #[test]
-    fn a_weak_cubic_is_undone_to_rounding_in_single_precision(m in 0.01_f32..1.0, k in -0.0186_f32..0.0186, turn in 0.0_f32..6.2) {
+    fn a_weak_cubic_is_undone_to_rounding_in_single_precision(m in 0.01_f32..1.0, k in -0.0185_f32..0.0185, turn in 0.0_f32..6.2) {
         let (cubic, values) = (EffectId::DetectionCubic, [k / (0.75 * m * m), 0.0, 0.0, 0.0]);
         let (s, c) = turn.sin_cos();
         let seen = Envelope::new(m * c, m * s, 0.0, 0.0);
         let back = cubic.unread(&values, seen, &Moment::default());
         let wide = Envelope::new(f64::from(seen.x_c), f64::from(seen.x_s), 0.0, 0.0);
         let exact = cubic.unread(&values.map(f64::from), wide, &Moment::default());
+        // half a unit of the difference's rounding, a sixth of the series, the rest of the products
         for (v, e) in [(back.x_c, exact.x_c), (back.x_s, exact.x_s)] {
-            prop_assert!((f64::from(v) - e).abs() <= 0.75 * f64::from(f32::EPSILON) * f64::from(m), "{v} {e}");
+            prop_assert!((f64::from(v) - e).abs() <= f64::from(f32::EPSILON) * f64::from(m), "{v} {e}");
         }
     }
 }
