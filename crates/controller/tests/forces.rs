@@ -145,7 +145,7 @@ fn the_rate_loop_holds_no_more_than_its_largest_rate_and_its_limit() {
 }
 
 #[test]
-fn the_short_way_is_taken_where_the_channels_together_stay_within_the_limit_of_one() {
+fn the_short_way_is_taken_where_every_channel_is_within_its_limit() {
     let none = OrbitCommands::default();
     let both =
         |v: OrbitCommands<f64>, cos: f64, sin: f64| (plain().step_within(&v, cos, sin), plain().step(&v, cos, sin));
@@ -154,16 +154,19 @@ fn the_short_way_is_taken_where_the_channels_together_stay_within_the_limit_of_o
     assert_eq!((short, whole.status), (Some(whole.volts), Status::Within));
     let volts = AxisForces { x_c: LIMIT_V, x_s: 0.0, y_c: 0.0, y_s: 0.0 };
     assert_eq!(plain().step_within(&OrbitCommands { v_ac: LIMIT_V, ..none }, 1.0, 0.0), Some(volts));
-    // two channels with 5.1 V together, each within its limit
-    let pairs = [
-        (OrbitCommands { v_ac: 4.9, v_as: 0.2, ..none }, [4.9, 0.2, 0.0, 0.0]),
-        (OrbitCommands { v_as: 4.9, v_qc: 0.2, ..none }, [0.0, 4.9, 0.2, 0.0]),
-        (OrbitCommands { v_qc: 4.9, v_qs: -0.2, ..none }, [0.0, 0.0, 4.9, -0.2]),
-    ];
-    for (v, [x_c, x_s, y_c, y_s]) in pairs {
-        let (short, whole) = both(v, 1.0, 0.0);
-        let volts = AxisForces { x_c, x_s, y_c, y_s };
-        assert_eq!((short, whole.volts, whole.status), (None, volts, Status::Within));
+    // every channel near its limit, and one beyond
+    let near = OrbitCommands { v_as: 4.9, v_qs: -4.9, v_qc: 4.9, v_ac: -4.9 };
+    assert!(both(near, 1.0, 0.0).0.is_some());
+    for over in [5.1, -5.1] {
+        for v in [
+            OrbitCommands { v_as: over, ..near },
+            OrbitCommands { v_qs: over, ..near },
+            OrbitCommands { v_qc: over, ..near },
+            OrbitCommands { v_ac: over, ..near },
+        ] {
+            let (short, whole) = both(v, 1.0, 0.0);
+            assert_eq!((short, whole.status), (None, Status::Limited), "{v:?}");
+        }
     }
     assert_eq!(both(OrbitCommands { v_as: f64::NAN, ..none }, 1.0, 0.0).0, None);
 }
@@ -178,8 +181,10 @@ fn the_two_loops_alone_are_equation_9_through_the_compensation() {
     let uneven = Allocation::new(Some(inverse), LIMIT_V).expect("valid");
     let halved = AxisForces { x_c: 0.5 * volts.x_c, x_s: 0.5 * volts.x_s, y_c: 2.0 * volts.y_c, y_s: 2.0 * volts.y_s };
     assert_eq!(uneven.axes_within(&v, 0.6, 0.8), Some(halved));
-    for v_as in [4.0, -4.0, f64::NAN] {
-        assert_eq!(plain().axes_within(&ControlOutputs { v_as, v_qc: 0.0 }, 0.6, 0.8), None, "{v_as}");
+    for v in [7.0, -7.0, f64::NAN] {
+        // 5.6 V along Y, and against X
+        assert_eq!(plain().axes_within(&ControlOutputs { v_as: v, v_qc: 0.0 }, 0.6, 0.8), None, "{v}");
+        assert_eq!(plain().axes_within(&ControlOutputs { v_as: 0.0, v_qc: v }, 0.6, 0.8), None, "{v}");
     }
 }
 

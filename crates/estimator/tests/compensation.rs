@@ -209,6 +209,15 @@ fn a_chain_that_is_a_cubic_before_matrices_and_offsets_is_undone_without_the_mom
 }
 
 #[test]
+fn a_vibration_along_one_axis_is_undone_too() {
+    let skew = Compensation::<f64, 2>::new(&[(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0])]).expect("valid");
+    let along_x = skew.apply(Envelope::new(0.6, -0.2, 0.0, 0.0), &Moment::default());
+    assert_eq!(along_x, Envelope::new(0.6, -0.2, -0.3, 0.1));
+    let along_y = skew.apply(Envelope::new(0.0, 0.0, 0.6, -0.2), &Moment::default());
+    assert_eq!(along_y, Envelope::new(0.0, 0.0, 0.6, -0.2));
+}
+
+#[test]
 fn effects_are_kept_in_the_order_in_which_the_signal_meets_them() {
     let given = [EffectId::DetectionOffset, EffectId::DetectionCubic].map(|id| (id, id.neutral()));
     let compensation = Compensation::<f64, 4>::new(&given).expect("valid");
