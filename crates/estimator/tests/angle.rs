@@ -129,6 +129,8 @@ fn the_direction_of_twice_the_angle_wants_a_direction_and_a_vibration_along_it()
     assert_eq!(of(&along_x, 1.0, 2.01), none(Status::Undetermined));
     assert_eq!(of(&along_x, 3.0, 0.0), none(Status::Undetermined));
     assert_eq!(of(&Envelope::new(0.0, 1.0, 2.0, 0.0), 1.0, 0.0), none(Status::Undetermined), "no vibration along X");
+    assert_eq!(of(&Envelope::new(1e-200, 0.0, 0.0, 0.0), 1.0, 0.0), none(Status::Undetermined), "nor of its square");
+    assert_eq!(of(&along_x, 0.0, 0.0), (1.0, 0.0, Status::Valid), "the origin counts as 0°");
     assert_eq!(of(&along_x, f64::NAN, 0.0), none(Status::Invalid));
     assert_eq!(of(&along_x, 1e200, 0.0), none(Status::Invalid));
 }
