@@ -303,6 +303,19 @@ fn weak_and_strong_cubics_are_undone_to_rounding_in_every_channel() {
 }
 
 #[test]
+fn channels_of_unequal_cubics_are_undone_each_by_its_own() {
+    let both = Envelope::new(1.0, 0.0, 1.0, 0.0);
+    for (k_x, k_y) in [(0.1, 0.0), (0.0, -0.1), (0.1, -0.1), (-0.02, 0.2), (0.2, -0.02), (0.1, 1e-6), (1e-6, 0.1)] {
+        let values = [0.5 * (k_x + k_y) / 0.75, 0.5 * (k_x - k_y) / 0.75, 0.0, 0.0];
+        let z = EffectId::DetectionCubic.unread(&values, both, &now());
+        for (u, k) in [(z.x_c, k_x), (z.y_c, k_y)] {
+            // Halley's steps from Newton's leave 1e-12 at a fifth
+            assert_abs_diff_eq!(u * (1.0 + k * u * u), 1.0, epsilon = 1e-11);
+        }
+    }
+}
+
+#[test]
 fn inverses_have_the_form_that_is_told_of_them() {
     let values = [1.5, 0.25, 0.0, 0.0];
     for &id in EffectId::ALL {
