@@ -144,6 +144,50 @@ fn the_rate_loop_holds_no_more_than_its_largest_rate_and_its_limit() {
     assert_eq!((no_direction.volts, no_direction.status), (0.0, Status::Invalid));
 }
 
+#[test]
+fn the_short_way_is_taken_where_every_channel_is_within_its_limit() {
+    let none = OrbitCommands::default();
+    let both =
+        |v: OrbitCommands<f64>, cos: f64, sin: f64| (plain().step_within(&v, cos, sin), plain().step(&v, cos, sin));
+    let v = OrbitCommands { v_as: 1.0, v_qs: 0.5, v_qc: -0.25, v_ac: 2.0 };
+    let (short, whole) = both(v, 0.6, 0.8);
+    assert_eq!((short, whole.status), (Some(whole.volts), Status::Within));
+    let volts = AxisForces { x_c: LIMIT_V, x_s: 0.0, y_c: 0.0, y_s: 0.0 };
+    assert_eq!(plain().step_within(&OrbitCommands { v_ac: LIMIT_V, ..none }, 1.0, 0.0), Some(volts));
+    // every channel near its limit, and one beyond
+    let near = OrbitCommands { v_as: 4.9, v_qs: -4.9, v_qc: 4.9, v_ac: -4.9 };
+    assert!(both(near, 1.0, 0.0).0.is_some());
+    for over in [5.1, -5.1] {
+        for v in [
+            OrbitCommands { v_as: over, ..near },
+            OrbitCommands { v_qs: over, ..near },
+            OrbitCommands { v_qc: over, ..near },
+            OrbitCommands { v_ac: over, ..near },
+        ] {
+            let (short, whole) = both(v, 1.0, 0.0);
+            assert_eq!((short, whole.status), (None, Status::Limited), "{v:?}");
+        }
+    }
+    assert_eq!(both(OrbitCommands { v_as: f64::NAN, ..none }, 1.0, 0.0).0, None);
+}
+
+#[test]
+fn the_two_loops_alone_are_equation_9_through_the_compensation() {
+    let v = ControlOutputs { v_as: 1.0, v_qc: 0.5 };
+    let volts = AxisForces { x_c: -0.5 * 0.8, x_s: 0.6, y_c: 0.5 * 0.6, y_s: 0.8 };
+    assert_eq!(plain().axes_within(&v, 0.6, 0.8), Some(volts));
+    let effects = [(EffectId::ActuationGainMismatch, [4.0, 0.0, 0.0, 0.0])];
+    let inverse = ActuationCompensation::new(&effects).expect("regular");
+    let uneven = Allocation::new(Some(inverse), LIMIT_V).expect("valid");
+    let halved = AxisForces { x_c: 0.5 * volts.x_c, x_s: 0.5 * volts.x_s, y_c: 2.0 * volts.y_c, y_s: 2.0 * volts.y_s };
+    assert_eq!(uneven.axes_within(&v, 0.6, 0.8), Some(halved));
+    for v in [7.0, -7.0, f64::NAN] {
+        // 5.6 V along Y, and against X
+        assert_eq!(plain().axes_within(&ControlOutputs { v_as: v, v_qc: 0.0 }, 0.6, 0.8), None, "{v}");
+        assert_eq!(plain().axes_within(&ControlOutputs { v_as: 0.0, v_qc: v }, 0.6, 0.8), None, "{v}");
+    }
+}
+
 proptest! {
     #[test]
     fn the_allocation_is_equation_9(v_as in -1.0_f64..1.0, v_qc in -1.0_f64..1.0, theta in -7.0_f64..7.0) {

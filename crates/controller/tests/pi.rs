@@ -107,6 +107,26 @@ fn a_loop_is_realised_below_one_and_not_at_one() {
     assert_eq!((tuned(1024.0, 1.0), tuned(2048.0, 0.5)), (Err("bandwidth_rad_s"), Err("bandwidth_rad_s")));
 }
 
+#[test]
+fn the_short_way_is_the_law_within_all_limits_and_nothing_elsewhere() {
+    let pi = pi();
+    let mut state = PiState { integral: 0.3 };
+    // 7.8 [e + ∫/2τ] with τ = ¼ s
+    let integral = 0.3 + 0.1 * PERIOD_S;
+    let volts = pi.energy_within(&mut state, 1.1, 1.0).expect("within");
+    assert_abs_diff_eq!(volts, 7.8 * (0.1 + integral / 0.5), epsilon = 1e-12);
+    assert_abs_diff_eq!(state.integral, integral, epsilon = 1e-15);
+    let volts = pi.quadrature_within(&mut state, -0.1).expect("within");
+    assert_abs_diff_eq!(volts, -7.8 * (-0.1 + 0.3 / 0.5), epsilon = 1e-12);
+    assert_abs_diff_eq!(state.integral, 0.3, epsilon = 1e-15);
+    // too much asked, too much summed though little asked, and no number
+    for (integral, e) in [(0.3, 2.0), (0.3, -3.0), (5.0, -9.5), (-5.0, 9.5), (0.3, f64::NAN)] {
+        let mut state = PiState { integral };
+        assert_eq!((pi.energy_within(&mut state, e, 0.0), state.integral), (None, integral), "{e}");
+        assert_eq!((pi.quadrature_within(&mut state, e), state.integral), (None, integral), "{e}");
+    }
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_command_within_the_limit(e: u64, integral: u64, later: u64) {

@@ -109,6 +109,32 @@ fn an_orbit_too_small_for_its_squares_has_no_direction_of_its_axis() {
     assert_eq!((direction.cos, direction.sin, direction.status), (1.0, 0.0, Status::Undetermined));
 }
 
+#[test]
+fn the_direction_of_twice_the_angle_wants_a_direction_and_a_vibration_along_it() {
+    let along_x = Envelope::new(2.0, 0.0, 0.0, 0.0);
+    let of = |e: &Envelope<f64>, cos_2: f64, sin_2: f64| {
+        let d = major_axis_of(e, cos_2, sin_2);
+        (d.cos, d.sin, d.status)
+    };
+    assert_eq!(of(&along_x, 1.0, 0.0), (1.0, 0.0, Status::Valid));
+    assert_eq!(of(&Envelope::new(-2.0, 0.0, 0.0, 0.0), 1.0, 0.0), (-1.0, 0.0, Status::Valid));
+    assert_eq!(of(&Envelope::new(0.0, 0.0, 3.0, 0.0), -1.0, 0.0), (0.0, 1.0, Status::Valid));
+    assert_eq!(of(&Envelope::new(0.0, 0.0, -3.0, 0.0), -1.0, 0.0), (-0.0, -1.0, Status::Valid));
+    // the largest that is taken for a unit vector
+    let (cos, sin, status) = of(&along_x, 1.0, 2.0);
+    assert_abs_diff_eq!(cos, 0.5_f64.sqrt(), epsilon = 1e-15);
+    assert_abs_diff_eq!(sin, 0.5_f64.sqrt(), epsilon = 1e-15);
+    assert_eq!(status, Status::Valid);
+    let none = |status| (1.0, 0.0, status);
+    assert_eq!(of(&along_x, 1.0, 2.01), none(Status::Undetermined));
+    assert_eq!(of(&along_x, 3.0, 0.0), none(Status::Undetermined));
+    assert_eq!(of(&Envelope::new(0.0, 1.0, 2.0, 0.0), 1.0, 0.0), none(Status::Undetermined), "no vibration along X");
+    assert_eq!(of(&Envelope::new(1e-200, 0.0, 0.0, 0.0), 1.0, 0.0), none(Status::Undetermined), "nor of its square");
+    assert_eq!(of(&along_x, 0.0, 0.0), (1.0, 0.0, Status::Valid), "the origin counts as 0°");
+    assert_eq!(of(&along_x, f64::NAN, 0.0), none(Status::Invalid));
+    assert_eq!(of(&along_x, 1e200, 0.0), none(Status::Invalid));
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_finite_reading_inside_its_period(

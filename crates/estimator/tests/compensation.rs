@@ -166,6 +166,58 @@ fn what_is_not_of_the_readout_or_out_of_bounds_is_refused() {
 }
 
 #[test]
+fn a_chain_that_is_a_cubic_before_matrices_and_offsets_is_undone_without_the_moment() {
+    let e = Envelope::new(0.6, -0.2, 0.5, 0.3);
+    let (cubic, skew) =
+        ((EffectId::DetectionCubic, [0.05, 0.01, 0.0, 0.0]), (EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0]));
+    let (gain, offset) =
+        ((EffectId::DetectionGainMismatch, [1.25, 0.0, 0.0, 0.0]), (EffectId::DetectionOffset, [0.1, -0.3, 0.0, 0.0]));
+    let drift = (EffectId::GainDrift, [0.1, 0.0, 0.0, 0.0]);
+    let late = (EffectId::AngleLatency, [0.01, 0.0, 0.0, 0.0]);
+    let clip = (EffectId::DetectionSaturation, [1.2, 0.0, 0.0, 0.0]);
+    let at = Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4 };
+    let chains: [(&[_], bool); 11] = [
+        (&[], true),
+        (&[offset], true),
+        (&[cubic], true),
+        (&[skew, gain, offset], true),
+        (&[cubic, skew, gain, offset], true),
+        (&[cubic, cubic], false),
+        (&[late, skew, gain], false),
+        (&[late, cubic, gain], false),
+        (&[cubic, skew, drift, offset], false),
+        (&[cubic, skew, clip], false),
+        (&[drift], false),
+    ];
+    for (chain, without) in chains {
+        let compensation = Compensation::<f64, 4>::new(chain).expect("valid");
+        let one_by_one = chain.iter().rev().fold(e, |e, (id, values)| id.unread(values, e, &at));
+        let at_any_moment = compensation.apply_at_any_moment(e);
+        assert_eq!(at_any_moment.is_some(), without, "{chain:?}");
+        let asked = core::cell::Cell::new(false);
+        let moment = || {
+            asked.set(true);
+            at
+        };
+        let applied = compensation.apply_at(e, moment);
+        assert_eq!(asked.get(), !without, "{chain:?}");
+        assert!(distance(&applied, &one_by_one) < 1e-14, "{chain:?}");
+        assert!(at_any_moment.is_none_or(|z| z == applied));
+        assert_eq!(compensation.apply(e, &at), applied);
+    }
+    assert_eq!(Compensation::<f64, 2>::none().apply_at_any_moment(e), Some(e));
+}
+
+#[test]
+fn a_vibration_along_one_axis_is_undone_too() {
+    let skew = Compensation::<f64, 2>::new(&[(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0])]).expect("valid");
+    let along_x = skew.apply(Envelope::new(0.6, -0.2, 0.0, 0.0), &Moment::default());
+    assert_eq!(along_x, Envelope::new(0.6, -0.2, -0.3, 0.1));
+    let along_y = skew.apply(Envelope::new(0.0, 0.0, 0.6, -0.2), &Moment::default());
+    assert_eq!(along_y, Envelope::new(0.0, 0.0, 0.6, -0.2));
+}
+
+#[test]
 fn effects_are_kept_in_the_order_in_which_the_signal_meets_them() {
     let given = [EffectId::DetectionOffset, EffectId::DetectionCubic].map(|id| (id, id.neutral()));
     let compensation = Compensation::<f64, 4>::new(&given).expect("valid");

@@ -104,6 +104,29 @@ fn a_length_near_one_is_set_right_and_any_other_starts_anew() {
 }
 
 #[test]
+fn the_short_way_is_taken_within_the_limit_and_near_length_one() {
+    let p = at(0.7, 0.1);
+    let sized = |length: f64| Phasor { cos: length * p.cos, sin: length * p.sin, ..p };
+    for correction in [-LIMIT_RAD_S, -300.0, 0.0, 4000.0, LIMIT_RAD_S] {
+        for length in [0.87, 1.0, 1.11] {
+            let short = oscillator().tune_within(&sized(length), correction);
+            assert_eq!(short, Some(oscillator().tune(&sized(length), correction)));
+        }
+    }
+    for (length, correction) in
+        [(1.0, 19_001.0), (1.0, -19_001.0), (1.0, f64::NAN), (0.86, 0.0), (1.12, 0.0), (0.0, 0.0), (f64::NAN, 0.0)]
+    {
+        assert_eq!(oscillator().tune_within(&sized(length), correction), None, "{length} {correction}");
+    }
+    // beyond the limit the length is set right all the same, and a length far off starts anew at the correction
+    let beyond = oscillator().tune(&sized(1.1), 1e9);
+    assert_eq!(Some(beyond), oscillator().tune_within(&sized(1.1), LIMIT_RAD_S));
+    let anew = oscillator().tune(&sized(3.0), 4000.0);
+    let right = oscillator().tune(&p, 4000.0);
+    assert_eq!(anew, Phasor { cos: 1.0, sin: 0.0, ..right });
+}
+
+#[test]
 fn parameters_outside_their_domain_are_refused_by_name() {
     let new = |frequency_hz, period_s, limit_rad_s| {
         Oscillator::<f64>::new(frequency_hz, period_s, limit_rad_s).map(|_| ()).map_err(|e| e.parameter)

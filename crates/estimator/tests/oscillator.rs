@@ -105,6 +105,25 @@ fn the_fastest_loop_that_a_period_realises_is_just_below_one() {
     assert_eq!(new(2048.0, 0.5).map_err(|e| e.parameter), Err("bandwidth_rad_s"));
 }
 
+#[test]
+fn the_short_way_is_the_loop_within_all_limits_and_nothing_elsewhere() {
+    let short = |held: f64, p: &Pendulum<f64>| {
+        let mut state = LockState { detuning_rad_s: held };
+        (lock().step_within(&mut state, p), state.detuning_rad_s)
+    };
+    // K = 120 1/s, ω²T = 1.8 1/s a step
+    for (held, error) in [(5.0, 0.25), (-7.0, -1.0), (100.0, 1.0)] {
+        let (rad_s, detuning) = short(held, &with_error(error));
+        assert_abs_diff_eq!(detuning, held + 1.8 * error, epsilon = 1e-12);
+        assert_abs_diff_eq!(rad_s.expect("within"), held + 121.8 * error, epsilon = 1e-12);
+    }
+    // no measurement; the sum beyond the limit; the correction alone; the integral alone
+    for (held, error) in [(5.0, 1.01), (5.0, -1.01), (599.0, 0.9), (590.0, 0.4), (-590.0, -0.4), (700.0, -0.9)] {
+        assert_eq!(short(held, &with_error(error)), (None, held), "{held} {error}");
+    }
+    assert_eq!(short(5.0, &Pendulum::default()), (None, 5.0));
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_correction_within_the_limit(e: u64, l: u64, held: u64) {

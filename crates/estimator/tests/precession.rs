@@ -154,6 +154,45 @@ fn a_state_that_is_no_direction_is_no_last_direction() {
 }
 
 #[test]
+fn the_short_way_is_a_steady_move_on_one_side_of_the_axis() {
+    for (from, to) in [(0.3, 0.4), (1.2, 1.1), (-0.3, -0.5), (-1.2, -0.95)] {
+        let (mut short, _) = followed([from]);
+        let mut whole = short;
+        assert!(tracker().step_steadily(&mut short, &line(to)));
+        assert_eq!((tracker().step(&mut whole, &line(to)), whole), (Movement::Steady, short));
+        assert_abs_diff_eq!(short.sin_2_per_window, (2.0 * (to - from)).sin() / 4.0, epsilon = 1e-15);
+        assert_abs_diff_eq!(short.degrees(), to.to_degrees(), epsilon = 1e-13);
+    }
+    let refused = |state: PrecessionState<f64>, p: &Pendulum<f64>| {
+        let mut after = state;
+        let steady = tracker().step_steadily(&mut after, p);
+        // as text, in which NaN is NaN
+        assert!(steady || format!("{after:?}") == format!("{state:?}"), "something changed");
+        !steady
+    };
+    let at = |theta: f64| followed([theta]).0;
+    // no last direction, across either end of the R axis, onto it, a jump, no line, no number
+    assert!(refused(PrecessionState::default(), &line(0.3)));
+    assert!(refused(at(0.05), &line(-0.05)) && refused(at(1.55), &line(1.6)) && refused(at(0.05), &line(0.0)));
+    assert!(refused(at(0.4), &line(0.7001)) && refused(at(0.8), &line(0.4999)) && !refused(at(0.4), &line(0.6999)));
+    let small = |size: f64| Pendulum { e: 4.0, q: 0.0, r: 0.0, s: size, l: 0.0 };
+    assert!(refused(at(0.7), &small(0.25)) && !refused(at(0.7), &small(0.26)));
+    for no_number in [f64::NAN, f64::INFINITY] {
+        assert!(refused(at(0.4), &Pendulum { r: no_number, ..line(0.4) }));
+        assert!(refused(at(0.4), &Pendulum { s: no_number, ..line(0.4) }));
+    }
+    // a state of half to three halves of a unit vector is a direction, and its rate has to be one
+    let sized = |size: f64| PrecessionState { cos_2: 0.6 * size, sin_2: 0.8 * size, ..PrecessionState::default() };
+    let same = Pendulum { e: 4.0, q: 0.0, r: 2.4, s: 3.2, l: 0.0 };
+    for (size, expected) in [(0.49, true), (0.51, false), (1.49, false), (1.51, true)] {
+        assert_eq!(refused(sized(size), &same), expected, "{size}");
+    }
+    for rate in [0.8, -0.8, f64::NAN] {
+        assert!(refused(PrecessionState { sin_2_per_window: rate, ..at(0.4) }, &line(0.4)), "{rate}");
+    }
+}
+
+#[test]
 fn a_rate_in_the_state_beyond_a_jump_is_taken_as_a_jump() {
     let most = 0.6_f64.sin();
     for (held, expected) in [(9.0, most), (-9.0, -most), (f64::NAN, 0.0), (0.1, 0.1)] {

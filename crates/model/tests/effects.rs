@@ -4,7 +4,7 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use approx::assert_abs_diff_eq;
 use cvg_model::effects::harmonic_n::factor;
-use cvg_model::effects::{Description, Effect, EffectId, Moment, Role, Scaling, Search, Stage, Values};
+use cvg_model::effects::{Description, Effect, EffectId, Inverse, Moment, Role, Scaling, Search, Stage, Values};
 use cvg_model::{AxisForces, Envelope, Orbit, Real};
 
 const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 0.3 };
@@ -276,4 +276,63 @@ fn an_effect_without_an_inverse_of_its_own_is_undone_step_by_step() {
     // what it doesn't act on it leaves
     assert_eq!(Bent::mechanics(&bend, &VIBRATION), Envelope::zero());
     assert_eq!(Bent::input_rate(&bend, 3.0, &now()), 3.0);
+}
+
+#[test]
+fn weak_and_strong_cubics_are_undone_to_rounding_in_every_channel() {
+    // k u³ + u = 1 at a readout of 1 V, from a weak to a strong k = ¾κ, and in one channel or both
+    for k in [0.0, 1e-9, 1e-6, 5e-5, 1.2e-4, 1.23e-4, 1e-3, 0.01, 0.1] {
+        for k in [k, -k] {
+            let values = [k / 0.75, 0.0, 0.0, 0.0];
+            let alone = Envelope::new(1.0, 0.0, 0.0, 0.0);
+            for e in [alone, Envelope::new(0.0, 0.0, 0.0, 1.0), Envelope::new(0.6, 0.8, 0.8, -0.6)] {
+                let z = EffectId::DetectionCubic.unread(&values, e, &now());
+                for (c, s, seen) in [(z.x_c, z.x_s, e.x_c.hypot(e.x_s)), (z.y_c, z.y_s, e.y_c.hypot(e.y_s))] {
+                    let u = c.hypot(s);
+                    assert_abs_diff_eq!(u * (1.0 + k * u * u), seen, epsilon = 4e-16);
+                }
+            }
+            // κ + δκ and κ − δκ
+            let split =
+                EffectId::DetectionCubic.unread(&[0.0, k / 0.75, 0.0, 0.0], Envelope::new(1.0, 0.0, 1.0, 0.0), &now());
+            for (u, k) in [(split.x_c, k), (split.y_c, -k)] {
+                assert_abs_diff_eq!(u * (1.0 + k * u * u), 1.0, epsilon = 4e-16);
+            }
+        }
+    }
+}
+
+#[test]
+fn channels_of_unequal_cubics_are_undone_each_by_its_own() {
+    let both = Envelope::new(1.0, 0.0, 1.0, 0.0);
+    for (k_x, k_y) in [(0.1, 0.0), (0.0, -0.1), (0.1, -0.1), (-0.02, 0.2), (0.2, -0.02), (0.1, 1e-6), (1e-6, 0.1)] {
+        let values = [0.5 * (k_x + k_y) / 0.75, 0.5 * (k_x - k_y) / 0.75, 0.0, 0.0];
+        let z = EffectId::DetectionCubic.unread(&values, both, &now());
+        for (u, k) in [(z.x_c, k_x), (z.y_c, k_y)] {
+            // Halley's steps from Newton's leave 1e-12 at a fifth
+            assert_abs_diff_eq!(u * (1.0 + k * u * u), 1.0, epsilon = 1e-11);
+        }
+    }
+}
+
+#[test]
+fn inverses_have_the_form_that_is_told_of_them() {
+    let values = [1.5, 0.25, 0.0, 0.0];
+    for &id in EffectId::ALL {
+        let form = match id.inverse(&values) {
+            Inverse::Unread => "unread",
+            Inverse::Affine => "affine",
+            Inverse::Cubic(cubic) => {
+                let z = id.unread(&values, VIBRATION, &now());
+                assert_eq!(cubic.undo(VIBRATION), z);
+                "cubic"
+            }
+        };
+        let expected = match id {
+            EffectId::DetectionSkew | EffectId::DetectionGainMismatch | EffectId::DetectionOffset => "affine",
+            EffectId::DetectionCubic => "cubic",
+            _ => "unread",
+        };
+        assert_eq!(form, expected, "{id}");
+    }
 }

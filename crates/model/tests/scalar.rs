@@ -121,3 +121,26 @@ fn a_bound_holds_for_every_number_and_for_none() {
     bounds::<f64>();
     bounds::<Least>();
 }
+
+fn within<T: Float>() {
+    let within = |v: f64, limit: f64| T::from_f64(v).within(T::from_f64(limit));
+    for v in [0.0, 0.5, 3.0, -0.5, -3.0] {
+        assert!(within(v, 3.0), "{v}");
+    }
+    for (v, limit) in [(3.5, 3.0), (-3.5, 3.0), (f64::NAN, 3.0), (0.0, f64::NAN), (0.0, -1.0), (f64::INFINITY, 3.0)] {
+        assert!(!within(v, limit), "{v} {limit}");
+    }
+}
+
+#[test]
+fn within_a_bound_are_its_ends_and_no_number_is() {
+    within::<f32>();
+    within::<f64>();
+    within::<Least>();
+}
+
+#[test]
+fn a_scalar_rounds_as_it_says() {
+    assert_eq!((<f32 as Real>::epsilon(), <f64 as Real>::epsilon()), (f32::EPSILON, f64::EPSILON));
+    assert_eq!(Least::epsilon(), Least(0.0), "one that doesn't say does not");
+}

@@ -130,3 +130,54 @@ fn a_phase_error_of_half_the_energy_locks_anew() {
         assert_eq!(becomes(in_mode(mode, 3), &with(|p| p.l = 12.49)).0, mode);
     }
 }
+
+#[test]
+fn an_instrument_goes_on_as_wished_where_nothing_is_counted_and_nothing_to_forget() {
+    let on = |state: SupervisorState, o: Observation<f64>| {
+        let on = supervisor().goes_on(&state, &o.pendulum);
+        if on {
+            // all that a step does is to count the window
+            let mut counted = state;
+            counted.count();
+            assert_eq!(step(state, &o), (counted, if state.mode == Mode::Hold { RUN_HELD } else { RUN }));
+        }
+        on
+    };
+    for mode in [Mode::WholeAngle, Mode::Hold] {
+        let state = in_mode(mode, FORGET + 5);
+        assert!(on(state, well()));
+        for wish in [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off] {
+            assert_eq!(on(SupervisorState { wish, ..state }, well()), wish == state.wish);
+        }
+        for (bad, repeats, clipped) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)] {
+            assert!(!on(SupervisorState { bad, repeats, clipped, ..state }, well()));
+        }
+        // what is left of earlier starts is forgotten by a whole step
+        for (starts, coasts, cause) in
+            [(1, 0, None), (0, 1, None), (1, 1, None), (0, 0, Some(Fault::DeadChannel)), (2, 3, Some(Fault::NoLock))]
+        {
+            let past = |windows| SupervisorState { starts, coasts, cause, windows, ..state };
+            assert!(on(past(FORGET - 2), well()) && !on(past(FORGET - 1), well()) && !on(past(u32::MAX), well()));
+        }
+        assert!(on(SupervisorState { windows: u32::MAX, ..state }, well()));
+        for (e, expected) in [(6.25, false), (6.26, true), (56.24, true), (56.25, false), (f64::NAN, false)] {
+            assert_eq!(on(state, energy(e)), expected, "{e}");
+        }
+        // quadrature and phase together below half the energy
+        for (q, l, expected) in [(6.0, 6.4, true), (-6.0, -6.4, true), (6.0, 6.5, false), (12.5, 0.0, false)] {
+            assert_eq!(on(state, with(|p| (p.q, p.l) = (q, l))), expected, "{q} {l}");
+        }
+    }
+    for mode in [Mode::Listen, Mode::Sweep, Mode::Lock, Mode::SpinUp, Mode::RingDown, Mode::Coast, Mode::Fault] {
+        assert!(!on(in_mode(mode, 3), well()), "{mode:?}");
+    }
+}
+
+#[test]
+fn windows_are_counted_as_far_as_they_can_be() {
+    let mut state = in_mode(Mode::Hold, u32::MAX - 1);
+    state.count();
+    assert_eq!(state, in_mode(Mode::Hold, u32::MAX));
+    state.count();
+    assert_eq!(state, in_mode(Mode::Hold, u32::MAX));
+}
