@@ -108,6 +108,20 @@ fn a_loop_is_realised_below_one_and_not_at_one() {
 }
 
 #[test]
+fn at_the_limit_the_integral_stays_in_either_loop_and_either_sense() {
+    let pi = pi();
+    for sign in [1.0, -1.0] {
+        for integral in [0.0, 0.2, -0.2] {
+            let (mut energy, mut quadrature) = (PiState { integral }, PiState { integral });
+            let v_as = pi.energy(&mut energy, sign * 3.0, 0.0);
+            let v_qc = pi.quadrature(&mut quadrature, sign * 3.0);
+            assert_eq!((v_as.volts, v_as.status, energy.integral), (sign * LIMIT_V, Status::Limited, integral));
+            assert_eq!((v_qc.volts, v_qc.status, quadrature.integral), (-sign * LIMIT_V, Status::Limited, integral));
+        }
+    }
+}
+
+#[test]
 fn the_short_way_is_the_law_within_all_limits_and_nothing_elsewhere() {
     let pi = pi();
     let mut state = PiState { integral: 0.3 };
