@@ -45,8 +45,10 @@ pub fn major_axis<T: Float>(e: &Envelope<T>, p: &Pendulum<T>) -> Direction<T> {
     let in_phase = cos * e.x_c + sin * e.y_c;
     // the length of (cos, sin), squared
     let length_2 = T::two() * line * (line + p.r.magnitude());
+    // so small that squares are rounded by more than their share; never where nothing is rounded
+    let lost = T::epsilon() > T::zero() && length_2 * T::epsilon() <= T::zero();
     // false for NaN and for an overflow
-    if length_2 > T::zero() && length_2.is_finite() && in_phase != T::zero() {
+    if length_2 > T::zero() && !lost && length_2.is_finite() && in_phase != T::zero() {
         let scale = T::one() / length_2.sqrt();
         let scale = if in_phase < T::zero() { -scale } else { scale };
         Direction { cos: cos * scale, sin: sin * scale, status: Status::Valid }

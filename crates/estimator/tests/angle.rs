@@ -104,9 +104,18 @@ fn a_vibration_has_a_direction_above_the_least_amplitude() {
 
 #[test]
 fn an_orbit_too_small_for_its_squares_has_no_direction_of_its_axis() {
-    let e = Envelope::new(1e-85, 0.0, 0.0, 0.0);
-    let direction = major_axis(&e, &e.pendulum());
-    assert_eq!((direction.cos, direction.sin, direction.status), (1.0, 0.0, Status::Undetermined));
+    // from where R² rounds to zero to where it is rounded by a hundredth
+    for y_c in [1e-85, 1.253_685_680_185_679_2e-81, 1e-80, 1e-78] {
+        let e = Envelope::new(0.0, 0.0, y_c, 0.0);
+        let direction = major_axis(&e, &e.pendulum());
+        assert_eq!((direction.cos, direction.sin, direction.status), (1.0, 0.0, Status::Undetermined), "{y_c}");
+    }
+    for y_c in [1e-76, 1e-20, 1.0, 1e70] {
+        let e = Envelope::new(0.0, 0.0, y_c, 0.0);
+        let direction = major_axis(&e, &e.pendulum());
+        assert_eq!((direction.cos, direction.status), (0.0, Status::Valid), "{y_c}");
+        assert_abs_diff_eq!(direction.sin, 1.0, epsilon = 1e-14);
+    }
 }
 
 #[test]
