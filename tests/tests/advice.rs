@@ -56,6 +56,37 @@ fn one_rate_does_not_tell_anisodamping_from_the_mismatch_and_the_advised_runs_do
     assert_eq!(advised, ["rotation runs at another rate and in the opposite direction"]);
 }
 
+/// One run at one rate, of so many seconds and samples per second.
+fn one_run(duration: f64, samples_per_s: f64) -> Identification {
+    let mut settings = bench(&[], &["rot+500.csv"], true);
+    settings.sample_hz = samples_per_s;
+    for run in &mut settings.runs {
+        if let Run::Rotation { duration_s, .. } = run {
+            *duration_s = duration;
+        }
+    }
+    identify(settings).expect("one run is a campaign")
+}
+
+#[test]
+fn one_rate_gives_a_ratio_within_what_anisodamping_could_make_of_it() {
+    // at most 0.02 1/s along the axes turns the pattern by 0.02/(4 kΩ) sin 2θ, half of the ratio's own share
+    let most = 1.96 * 2.0 * 0.02 / (4.0 * 0.78 * 500f64.to_radians());
+    // a run that is looked at whole, and one that is thinned
+    for identified in [one_run(20.0, 100.0), one_run(250.0, 1000.0)] {
+        let ratio = identified.report.detection_gain_ratio.expect("it is told, if not well");
+        let width = 0.5 * (ratio.ci95[1] - ratio.ci95[0]);
+        assert!(width > 0.5 * most && width < 1.1 * most, "{ratio:?} of at most ±{most}");
+        assert!(ratio.ci95[0] < 1.0132 && ratio.ci95[1] > 1.0132, "{ratio:?}");
+        // forces that are late by up to some 2 ms turn the pattern at 1/τ of that, which looks like k
+        let k = identified.report.angular_gain;
+        let late = 1.96 * 2e-3 * 0.78 / 22.0;
+        let width = 0.5 * (k.ci95[1] - k.ci95[0]);
+        assert!(width > 0.9 * late && width < 1.1 * late, "{k:?} of ±{late}");
+        assert!(k.ci95[0] < 0.78 && k.ci95[1] > 0.78, "{k:?}");
+    }
+}
+
 #[test]
 fn both_directions_at_one_rate_lack_another_rate() {
     let (advised, _) = followed(&[], &["rot+500.csv", BACK], true);

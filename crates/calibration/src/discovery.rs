@@ -415,7 +415,7 @@ fn mean_square(fit: &Fit) -> f64 {
     if fit.counted[0] <= fit.set_aside {
         return f64::INFINITY;
     }
-    (fit.chi2[0] + fit.chi2[1] + fit.prior_chi2 - fit.step_gain).max(0.0) / count(fit).max(1.0)
+    fit.left() / count(fit).max(1.0)
 }
 
 /// ln n per parameter, and 2 ln of the alternatives tried.

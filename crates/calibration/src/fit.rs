@@ -60,6 +60,8 @@ pub(crate) struct Fit {
     pub(crate) unknowns: Vec<Unknown>,
     /// covariance of the unknowns if the residuals are white
     pub(crate) covariance: DMatrix<f64>,
+    /// the part of it that the residuals' noise makes; the rest is what considered unknowns could be
+    pub(crate) by_noise: DMatrix<f64>,
     /// starts of the segments, per track
     pub(crate) starts: Vec<Vec<Start>>,
     /// Σ(r/σ)² over angle residuals, and over amplitude residuals, before the last step
@@ -72,6 +74,13 @@ pub(crate) struct Fit {
     pub(crate) counted: [usize; 2],
     /// samples set aside as spikes
     pub(crate) set_aside: usize,
+}
+
+impl Fit {
+    /// Σ(r/σ)² after the last step, with the squared distances from the priors.
+    pub(crate) fn left(&self) -> f64 {
+        (self.chi2[0] + self.chi2[1] + self.prior_chi2 - self.step_gain).max(0.0)
+    }
 }
 
 /// How a fit is run.
@@ -116,6 +125,7 @@ pub(crate) fn fit(
         hypothesis: hypothesis.clone(),
         unknowns: unknowns.to_vec(),
         covariance: DMatrix::zeros(n, n),
+        by_noise: DMatrix::zeros(n, n),
         starts: tracks.iter().map(|t| t.starts.clone()).collect(),
         chi2: [0.0; 2],
         prior_chi2: 0.0,
@@ -159,10 +169,13 @@ pub(crate) fn fit(
                 (here, polishing)
             }
         };
-        let Some((step, covariance)) = solve(&from.normal, &from.right, damping, &considered) else { break };
+        let Some(Solution { step, by_noise, covariance }) = solve(&from.normal, &from.right, damping, &considered)
+        else {
+            break;
+        };
         from.apply(&step, &mut result);
         if damping == 0.0 || result.covariance.iter().all(|v| *v == 0.0) {
-            result.covariance = covariance;
+            (result.covariance, result.by_noise) = (covariance, by_noise);
         }
         let deviation = |i: usize| result.covariance[(i, i)].max(0.0).sqrt();
         // what the step moves or, of unknowns that bend the residuals little, leaves
@@ -325,26 +338,28 @@ fn collect(
         .collect()
 }
 
-/// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that; also gives the
-/// covariance. Considered unknowns, those with a deviation, do not move; what they could be shows in the covariance.
-fn solve(
-    normal: &DMatrix<f64>,
-    right: &DVector<f64>,
-    damping: f64,
-    considered: &[Option<f64>],
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+/// A step of the unknowns and its covariance: all of it, and the part that the residuals' noise makes.
+struct Solution {
+    step: DVector<f64>,
+    by_noise: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that. Considered unknowns, those with a deviation, do not move; what they could be shows in the covariance.
+fn solve(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64, considered: &[Option<f64>]) -> Option<Solution> {
     let n = right.len();
     let free: Vec<usize> = (0..n).filter(|&i| considered[i].is_none()).collect();
     let held: Vec<(usize, f64)> = (0..n).filter_map(|i| considered[i].map(|d| (i, d))).collect();
     let inverse = scaled_inverse(&normal.select_rows(&free).select_columns(&free), damping)?;
-    let (mut step, mut covariance) = (DVector::zeros(n), DMatrix::zeros(n, n));
+    let (mut step, mut by_noise) = (DVector::zeros(n), DMatrix::zeros(n, n));
     let moved = &inverse * right.select_rows(&free);
     for (a, &i) in free.iter().enumerate() {
         step[i] = moved[a];
         for (b, &j) in free.iter().enumerate() {
-            covariance[(i, j)] = inverse[(a, b)];
+            by_noise[(i, j)] = inverse[(a, b)];
         }
     }
+    let mut covariance = by_noise.clone();
     for &(c, deviation) in &held {
         // a unit of the held unknown moves the free ones by −N⁻¹ n_c
         let mut sensitivity = DVector::zeros(n);
@@ -355,7 +370,7 @@ fn solve(
         sensitivity[c] = 1.0;
         covariance.ger(deviation * deviation, &sensitivity, &sensitivity, 1.0);
     }
-    step.iter().all(|s| s.is_finite()).then_some((step, covariance))
+    step.iter().all(|s| s.is_finite()).then_some(Solution { step, by_noise, covariance })
 }
 
 /// The inverse of a symmetric positive semidefinite matrix; directions without information carry a large variance
@@ -480,7 +495,7 @@ impl Residual {
 const BLOCK: usize = 64;
 
 /// Covariance of a fit's unknowns that allows for autocorrelated residuals: scores summed over blocks of neighbouring
-/// samples (a cluster-robust sandwich).
+/// samples (a cluster-robust sandwich). What considered unknowns could be is added as it is: no residual speaks of them.
 pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DMatrix<f64> {
     let n = fit.unknowns.len();
     let sorted = Unknowns::new(&fit.hypothesis, fit.unknowns.clone());
@@ -512,7 +527,7 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
     let blocks: usize = meats.iter().map(|m| m.1).sum();
     let meat = meats.into_iter().fold(DMatrix::zeros(n, n), |sum, m| sum + m.0);
     let finite = blocks as f64 / (blocks.saturating_sub(n)).max(1) as f64;
-    &fit.covariance * meat * &fit.covariance * finite
+    &fit.by_noise * meat * &fit.by_noise * finite + &fit.covariance - &fit.by_noise
 }
 
 /// Scores w·r·slopes of one segment, block by block.

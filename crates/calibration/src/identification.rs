@@ -219,7 +219,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
 /// memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
 fn covariance(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
-    let scale = ((fit.chi2[0] + fit.chi2[1]) / dof).max(f64::MIN_POSITIVE);
+    let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
     let plain = &fit.covariance * scale * undescribed(bench, fit);
     let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
     let n = fit.unknowns.len();

@@ -158,17 +158,26 @@ impl Bench {
     /// The unknowns of a hypothesis on this campaign: what the recorded columns can speak of at all.
     ///
     /// What the commands do beside their scale is left alone unless runs at two or more rates, or in both directions,
-    /// can tell it from the rest.
+    /// can tell it from the rest. Their latency turns the pattern at a steady rate: k is uncertain by it in any case.
     pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
-        self.unknowns_of(hypothesis, self.tracks_differ() && self.excess() < LARGEST_EXCESS)
+        self.unknowns_of(hypothesis, self.drive_is_told())
+    }
+
+    /// The runs tell what the commands do from the rest.
+    fn drive_is_told(&self) -> bool {
+        self.tracks_differ() && self.excess() < LARGEST_EXCESS
     }
 
     fn unknowns_of(&self, hypothesis: &Hypothesis, drive: bool) -> Vec<Unknown> {
         let mut all = vec![Unknown::AngularGain];
-        let commands = drive && self.tracks.iter().any(|t| t.track.has_commands());
+        let recorded = self.tracks.iter().any(|t| t.track.has_commands());
+        let commands = drive && recorded;
         let quadrature = self.tracks.iter().any(|t| t.track.has_quadrature());
         if self.instrument == Instrument::Gyroscope && commands {
-            all.extend([Unknown::ForceScale, Unknown::ControlLatency]);
+            all.push(Unknown::ForceScale);
+        }
+        if self.instrument == Instrument::Gyroscope && recorded {
+            all.push(Unknown::ControlLatency);
         }
         all.extend(hypothesis.effect_unknowns().into_iter().filter(|u| match u {
             Unknown::Effect(i, _) => match hypothesis.members[*i].id {
@@ -272,8 +281,13 @@ impl Bench {
 
     /// Priors for the unknowns that the data may be silent about.
     pub(crate) fn priors(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Vec<Prior> {
+        self.priors_of(hypothesis, drive, self.drive_is_told())
+    }
+
+    fn priors_of(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, drive_is_free: bool) -> Vec<Prior> {
         let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
-        let mut all = vec![prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S)];
+        let latency = prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S);
+        let mut all = vec![Prior { considered: !drive_is_free, ..latency }];
         let mut effect = |id, p, mean, deviation| {
             if let Some(member) = hypothesis.position(id) {
                 all.push(prior(Unknown::Effect(member, p), mean, deviation));
@@ -491,7 +505,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
         // drag it along.
         let free_drive = last && bench.tracks_differ() && bench.excess() < LARGEST_EXCESS;
         let unknowns = bench.unknowns_of(&hypothesis, free_drive);
-        let priors = bench.priors(&hypothesis, drive.as_ref());
+        let priors = bench.priors_of(&hypothesis, drive.as_ref(), free_drive);
         let effort = if last { Effort::FULL } else { Effort::ROUGH };
         let result = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, effort);
         hypothesis = result.hypothesis.clone();

@@ -224,22 +224,43 @@ fn whole_low_orders_of_the_table_have_a_cause_and_what_is_empirical_has_none() {
     assert!(!explains(EffectId::RateOffset, 0.5) && !explains(EffectId::HarmonicN, 4.0));
 }
 
+/// rms over the pattern angle of what an effect of the readout adds to it, at an amplitude and a precession rate.
+fn shift(id: EffectId, amplitude: f64, precession_rad_s: f64) -> f64 {
+    let description = id.description();
+    let mut values: Values<f64> = id.neutral();
+    for (value, p) in values.iter_mut().zip(description.parameters) {
+        if p.role == Role::Fitted {
+            *value += 0.1 * p.scale;
+        }
+    }
+    let at = Moment { t_s: 3.0, table_rad: 0.4, precession_rad_s };
+    let angles = (0..24).map(|i| (f64::from(i) + 0.5) * core::f64::consts::PI / 24.0);
+    let squares = angles.map(|theta| {
+        let (sin, cos) = theta.sin_cos();
+        let seen = id.read(&values, Envelope::new(amplitude * cos, 0.0, amplitude * sin, 0.0), &at);
+        let turned = seen.y_c.atan2(seen.x_c) - theta;
+        turned * turned
+    });
+    (squares.sum::<f64>() / 24.0).sqrt()
+}
+
 #[test]
-fn an_effect_scales_with_rate_and_amplitude_as_where_it_acts_says() {
+fn an_effect_scales_with_rate_and_amplitude_as_its_definition_does() {
     for &id in EffectId::ALL {
-        let Description { stage, scaling, .. } = id.description();
-        // what moves the pattern has the longer to do so the slower it turns
-        let rate = match (stage, id) {
-            (Stage::Mechanics | Stage::Actuation, _) => -1,
-            (_, EffectId::AngleLatency) => 1,
-            _ => 0,
-        };
-        let amplitude = match id {
-            EffectId::DetectionCubic | EffectId::DetectionSaturation => 2,
-            EffectId::DetectionOffset => -1,
-            _ => 0,
-        };
-        assert_eq!((scaling.rate, scaling.amplitude), (rate, amplitude), "{id}");
+        let Description { stage, scaling, onsets, .. } = id.description();
+        match stage {
+            // what moves the pattern has the longer to do so the slower it turns
+            Stage::Mechanics | Stage::Actuation => assert_eq!(scaling.rate, -1, "{id}"),
+            Stage::Readout if onsets.is_empty() => {
+                let one = shift(id, 0.8, 2.0);
+                let exponent = |other: f64| (other / one).log2();
+                let (amplitude, rate) = (exponent(shift(id, 1.6, 2.0)), exponent(shift(id, 0.8, 4.0)));
+                assert!((amplitude - f64::from(scaling.amplitude)).abs() < 0.02, "{id}: a^{amplitude}");
+                assert!((rate - f64::from(scaling.rate)).abs() < 0.02, "{id}: rate^{rate}");
+            }
+            // the table turns with the input, and an onset has a corner
+            Stage::Input | Stage::Readout => assert_eq!(scaling.rate, 0, "{id}"),
+        }
     }
 }
 
