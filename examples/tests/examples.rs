@@ -48,7 +48,7 @@ fn rows(text: &str) -> Vec<Vec<String>> {
 /// The page with the tables of the rows `printed` made anew.
 fn rewritten(page: &str, printed: &str) -> String {
     let line = |old: &str| {
-        let name = old.split('|').nth(1).filter(|_| old.starts_with("| "));
+        let name = old.split('|').nth(1).filter(|_| old.starts_with("| ") && !old.starts_with("| ---"));
         let new = name.and_then(|name| printed.lines().find(|new| new.starts_with(&format!("|{name}|"))));
         format!("{}\n", new.unwrap_or(old))
     };

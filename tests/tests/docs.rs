@@ -250,6 +250,17 @@ fn every_chapter_is_in_the_summary() {
 }
 
 #[test]
+fn every_table_has_a_line_below_its_head_with_as_many_columns() {
+    let columns = |line: &str| line.replace("\\|", "").matches('|').count();
+    for file in files("docs/src", "md") {
+        let page = std::fs::read_to_string(&file).expect("a chapter");
+        for (head, below) in page.lines().zip(page.lines().skip(1)).filter(|(_, below)| below.starts_with("| ---")) {
+            assert_eq!(columns(head), columns(below), "{}: {head}", file.display());
+        }
+    }
+}
+
+#[test]
 fn every_equation_has_its_requirements_its_row_and_its_tests() {
     let table = read("specs/README.md");
     for n in 1..=11 {

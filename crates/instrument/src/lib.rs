@@ -24,9 +24,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-#[cfg(test)]
-extern crate std;
-
 pub mod settings;
 pub mod state;
 mod step;

@@ -1,5 +1,7 @@
 //! The way of nearly every window is a short cut: it has to leave what the way of all windows leaves, to the last bit.
 
+extern crate std;
+
 use cvg_controller::Wish;
 use cvg_estimator::Phasor;
 use cvg_model::Orbit;
