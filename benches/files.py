@@ -90,7 +90,7 @@ def write_recording(path, rows):
                 np.char.mod("%.7f", small(NOISE_V)),
                 np.char.mod("%.7f", a * y + small(NOISE_V)),
                 np.char.mod("%.7f", small(NOISE_V)),
-                np.char.mod("%.6g", v_as + small(1e-4)),
+                np.char.mod("%.6g", v_as),
                 np.char.mod("%.6g", small(1e-4)),
                 np.char.mod("%.4f", 25.0 + small(1e-2)),
             ]

@@ -12,6 +12,7 @@ use crate::fit::{Prepared, scaled_inverse};
 use crate::hypothesis::{Hypothesis, Unknown};
 use crate::pass::{Pace, Start, walk};
 use crate::recording::{Instrument, Role};
+use crate::statistics::median;
 use crate::unknowns::Unknowns;
 
 /// The energy balance of a hypothesis, with the force scale, the damping and the anisodamping that close it best.
@@ -31,6 +32,9 @@ impl EnergyBalance {
     }
 }
 
+/// Samples of a run that tell how strongly it was driven.
+const LOOKED_AT: usize = 500;
+
 /// The balance over all fitted runs; `None` where amplitude or commands were not recorded.
 pub(crate) fn energy_balance(
     tracks: &[Prepared],
@@ -47,42 +51,56 @@ pub(crate) fn energy_balance(
     }
     let n = free.len();
     let unknowns = Unknowns::new(hypothesis, free);
-    let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    let (mut squares, mut count) = (0.0, 0usize);
+    // the drive replaces the damping, to a part in a million: counted from that, what is left of it shows
+    let replaced = usual_growth(tracks);
+    // squares of the slopes and, last, of what is left of ln a
+    let mut squares = DMatrix::zeros(n + 1, n + 1);
+    let mut count = 0.0;
     for (p, starts) in tracks.iter().zip(starts) {
         for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
-            let (mut s, mut sr, mut rr, mut rows) = (DVector::zeros(n), 0.0, 0.0, 0usize);
+            let (mut origin, mut sum, mut samples) = (None, DVector::zeros(n + 1), 0.0);
             let pace = Pace { stride: p.track.stride, spike: p.limit.angle };
             walk(&p.track, segment, hypothesis, &unknowns, *start, pace, |row| {
                 if row.angle.abs() > pace.spike {
                     return;
                 }
-                let slopes = DVector::from_column_slice(row.amplitude_slopes);
-                normal.syger(1.0, &slopes, &slopes, 1.0);
-                right.axpy(row.amplitude, &slopes, 1.0);
-                s += &slopes;
-                sr += row.amplitude;
-                rr += row.amplitude * row.amplitude;
-                rows += 1;
+                let columns = row.amplitude_slopes.iter().copied().chain([row.amplitude]);
+                let mut columns = DVector::from_iterator(n + 1, columns);
+                columns[0] += replaced * columns[1];
+                columns -= &*origin.get_or_insert_with(|| columns.clone());
+                squares.syger(1.0, &columns, &columns, 1.0);
+                sum += columns;
+                samples += 1.0;
             });
             // each segment starts at an amplitude of its own
-            let m = rows.max(1) as f64;
-            normal.syger(-1.0 / m, &s, &s, 1.0);
-            right.axpy(-sr / m, &s, 1.0);
-            squares += rr - sr * sr / m;
-            count += rows;
+            squares.syger(-1.0 / f64::max(samples, 1.0), &sum, &sum, 1.0);
+            count += samples;
         }
     }
-    normal.fill_upper_triangle_with_lower_triangle();
-    let inverse = scaled_inverse(&normal, 0.0)?;
-    let step = &inverse * &right;
+    squares.fill_upper_triangle_with_lower_triangle();
+    let inverse = scaled_inverse(&squares.view((0, 0), (n, n)).into_owned(), 0.0)?;
+    let step: DVector<f64> = &inverse * squares.column(n).rows(0, n);
+    let left = DVector::from_fn(n + 1, |i, _| if i < n { -step[i] } else { 1.0 });
     let mut closed = hypothesis.clone();
     for (unknown, step) in unknowns.all.iter().zip(&step) {
         closed.set(*unknown, closed.get(*unknown) + step);
     }
+    closed.damping_per_s += replaced * step[0];
     Some(EnergyBalance {
-        mean_square: (squares - step.dot(&right)).max(0.0) / count.max(1) as f64,
+        mean_square: left.dot(&(squares * &left)).max(0.0) / f64::max(count, 1.0),
         closed,
         information: 1.0 / inverse[(0, 0)].max(f64::MIN_POSITIVE),
     })
+}
+
+/// The median of ȧ/a by the energy command at a force scale of 1, 1/s.
+fn usual_growth(tracks: &[Prepared]) -> f64 {
+    let mut all: Vec<f64> = tracks
+        .iter()
+        .map(|p| &p.track)
+        .flat_map(|t| (0..t.t_s.len()).step_by((t.t_s.len() / LOOKED_AT).max(1)).map(move |i| (t, i)))
+        .filter_map(|(t, i)| t.commands(i, 1).map(|v| -v.now.v_as / t.envelope(i).pendulum().e.sqrt()))
+        .filter(|growth| growth.is_finite())
+        .collect();
+    if all.is_empty() { 0.0 } else { median(&mut all) }
 }

@@ -140,7 +140,8 @@ pub(crate) fn fit(
     let mut step_number = 0;
     while step_number < effort.steps {
         let stride = |p: &Prepared| {
-            if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, role, effort) }
+            let samples = p.track.samples(role);
+            if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, samples, effort.thinned) }
         };
         let sums: Vec<Vec<Sums>> = tracks
             .par_iter()
@@ -283,17 +284,17 @@ impl Linearised {
     }
 }
 
-/// Largest turn of the pattern between samples of a thinned track, rad: the integrals along it stay good to a percent.
-const LARGEST_TURN: f64 = 0.45;
+/// Largest turn of the pattern between samples of a thinned track, rad: what a command that repeats with it does to the
+/// pattern stays good to 1e-5 of it.
+const LARGEST_TURN: f64 = 0.2;
 
-/// By how much a track is thinned while a fit converges.
-fn thinning(track: &Track, hypothesis: &Hypothesis, role: Role, effort: Effort) -> usize {
-    let samples = track.samples(role);
+/// By how much a track is thinned where `enough` of `samples` will do, as far as the pattern turns little between them.
+fn thinning(track: &Track, hypothesis: &Hypothesis, samples: usize, enough: usize) -> usize {
     let interval = (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / (track.t_s.len().max(2) - 1) as f64;
     let turn = (hypothesis.precession(track.mean_speed()) * interval).abs().max(1e-12);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
     let resolved = (LARGEST_TURN / turn) as usize;
-    (samples / effort.thinned).min(resolved).max(track.stride)
+    (samples / enough).min(resolved).max(track.stride)
 }
 
 /// Sums of all segments of a track; those of another role stay empty, so that the order of segments is kept.
@@ -419,6 +420,9 @@ impl Window {
     }
 }
 
+/// Samples that tell where a segment starts.
+const START_SAMPLES: usize = 500;
+
 /// The residuals of a hypothesis on the segments of `role`, per track.
 pub(crate) fn residuals(
     tracks: &[Prepared],
@@ -443,7 +447,7 @@ pub(crate) fn residuals(
                     if role == Role::Holdout {
                         // nothing was fitted here: where the segment starts is found first
                         let mut angles = Vec::new();
-                        let coarse = Pace::every(stride * (segment.range.len() / (stride * 500)).max(1));
+                        let coarse = Pace::every(thinning(track, hypothesis, segment.range.len(), START_SAMPLES));
                         walk(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
                         start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
                     }

@@ -82,6 +82,8 @@ const TOLD: f64 = 0.1;
 /// Gain ratios known no better than this, as the half width of the interval, are no answer.
 const WIDEST_DETECTION_RATIO: f64 = 0.1;
 const WIDEST_ACTUATION_RATIO: f64 = 0.02;
+/// A held-out error beyond this share of the angle's period is no error of an angle that is followed.
+const LARGEST_ERROR: f64 = 0.1;
 
 /// Identifies the instrument of a campaign.
 ///
@@ -136,6 +138,13 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
     let actuation_gain_ratio = knowledge.actuation_ratio(&mut warnings);
     let effects = knowledge.effects(&steps, &after);
+    if after.mean_square().sqrt() > LARGEST_ERROR * bench.start.period_rad {
+        warnings.push(format!(
+            "the angle is not followed: the model is off by {:.0}° on held-out data, so that nothing here can be relied \
+             on; rate_dps or table_deg, and the signs and scales of the channels, may not be what the campaign says",
+            after.mean_square().sqrt().to_degrees()
+        ));
+    }
     for e in effects.iter().filter(|e| !e.confounded_with.is_empty()) {
         warnings.push(format!(
             "{} is confounded with {} in this campaign; {} would separate them",
@@ -220,7 +229,8 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
 fn covariance(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
     let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
-    let plain = &fit.covariance * scale * undescribed(bench, fit);
+    // what considered unknowns could be does not depend on what is left
+    let plain = &fit.by_noise * (scale * undescribed(bench, fit) - 1.0) + &fit.covariance;
     let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
     let n = fit.unknowns.len();
     // raise each deviation to the larger of the two and keep the correlations

@@ -41,9 +41,11 @@ const VARYING_RATE: f64 = 0.2;
 /// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
 const STRETCHES: usize = 50;
 const EDGE: usize = 30;
-/// What the energy balance leaves of ln a, and how far it is trusted at best.
+/// What the energy balance leaves of ln a, and how far it is trusted at best; less where the angle has no say in the
+/// force scale. A recorded v_as is taken to act, noise and all: noise that a logger added pulls the scale towards zero.
 const BALANCE_NOISE: f64 = 1e-3;
 const BALANCE_SHARE: f64 = 0.3;
+const BALANCE_SHARE_ALONE: f64 = 3.0;
 /// How far below the usual misfit of all runs, as a share of it, one run's is believed.
 const LARGEST_LEAD: f64 = 0.3;
 /// How well a search places a line, as a share of its width, one over the longest run.
@@ -157,8 +159,8 @@ impl Bench {
 
     /// The unknowns of a hypothesis on this campaign: what the recorded columns can speak of at all.
     ///
-    /// What the commands do beside their scale is left alone unless runs at two or more rates, or in both directions,
-    /// can tell it from the rest. Their latency turns the pattern at a steady rate: k is uncertain by it in any case.
+    /// How strong the commands are and how late turns the pattern at a steady rate: k is uncertain by both in any case.
+    /// What else they do is left alone unless runs at two or more rates, or in both directions, can tell it.
     pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
         self.unknowns_of(hypothesis, self.drive_is_told())
     }
@@ -173,11 +175,8 @@ impl Bench {
         let recorded = self.tracks.iter().any(|t| t.track.has_commands());
         let commands = drive && recorded;
         let quadrature = self.tracks.iter().any(|t| t.track.has_quadrature());
-        if self.instrument == Instrument::Gyroscope && commands {
-            all.push(Unknown::ForceScale);
-        }
         if self.instrument == Instrument::Gyroscope && recorded {
-            all.push(Unknown::ControlLatency);
+            all.extend([Unknown::ForceScale, Unknown::ControlLatency]);
         }
         all.extend(hypothesis.effect_unknowns().into_iter().filter(|u| match u {
             Unknown::Effect(i, _) => match hypothesis.members[*i].id {
@@ -286,8 +285,8 @@ impl Bench {
 
     fn priors_of(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, drive_is_free: bool) -> Vec<Prior> {
         let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
-        let latency = prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S);
-        let mut all = vec![Prior { considered: !drive_is_free, ..latency }];
+        let considered = !drive_is_free;
+        let mut all = vec![Prior { considered, ..prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S) }];
         let mut effect = |id, p, mean, deviation| {
             if let Some(member) = hypothesis.position(id) {
                 all.push(prior(Unknown::Effect(member, p), mean, deviation));
@@ -303,9 +302,10 @@ impl Bench {
         let ratio = drive.map_or((1.0, belief::ACTUATION_RATIO), |d| (d.ratio(), d.ratio() * d.ratio_error.max(1e-6)));
         effect(EffectId::ActuationGainMismatch, 0, ratio.0, ratio.1);
         let silent = (0.0, belief::FORCING_PER_S / self.command_rms[0].hypot(self.command_rms[1]).max(1e-9));
-        let scale =
-            drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(self.energy_balance).unwrap_or(silent);
-        all.push(prior(Unknown::ForceScale, scale.0, scale.1));
+        let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };
+        let balance = self.energy_balance.map(|(scale, deviation)| (scale, deviation.max(share * scale)));
+        let scale = drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(balance).unwrap_or(silent);
+        all.push(Prior { considered, ..prior(Unknown::ForceScale, scale.0, scale.1) });
         // A search finds a line to a fraction of its width: beyond that lies another line.
         let spans = self.tracks.iter().map(|p| p.track.t_s[p.track.t_s.len() - 1] - p.track.t_s[0]);
         let width = LINE_SHARE / spans.fold(f64::MIN_POSITIVE, f64::max);
@@ -333,8 +333,8 @@ impl Bench {
         let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };
         let (scale, deviation) = (balance.closed.force_scale, balance.deviation(BALANCE_NOISE));
         if scale > 2.0 * deviation {
-            self.energy_balance = Some((scale, deviation.max(BALANCE_SHARE * scale)));
-            hypothesis.force_scale = scale;
+            self.energy_balance = Some((scale, deviation));
+            (hypothesis.force_scale, hypothesis.damping_per_s) = (scale, balance.closed.damping_per_s);
         }
     }
 
@@ -493,6 +493,8 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
         match &drive {
             Some(d) => {
                 hypothesis.force_scale = d.mean();
+                hypothesis.damping_per_s =
+                    ring_downs.iter().map(|r| 1.0 / r.tau_s).sum::<f64>() / ring_downs.len() as f64;
                 if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
                     hypothesis.set(Unknown::Effect(member, 0), d.ratio());
                 }

@@ -24,7 +24,7 @@ pub(crate) struct Track {
     /// every how many samples a fit looks at: more than one only in runs of more than [`ENOUGH_SAMPLES`]
     pub(crate) stride: usize,
     source: Source,
-    commands: Option<[Vec<f64>; 2]>,
+    commands: Option<[Held; 2]>,
 }
 
 /// A stretch of a track without a gap: it has one bias.
@@ -53,7 +53,7 @@ const FITTED_SHARE: f64 = 0.75;
 /// looked at evenly thinned, as far as the pattern turns little from sample to sample.
 const ENOUGH_SAMPLES: usize = 100_000;
 /// Largest turn of the table between the samples of a thinned run, rad.
-const LARGEST_THINNED_TURN: f64 = 0.3;
+const LARGEST_THINNED_TURN: f64 = 0.15;
 /// A segment needs this many samples to carry a bias of its own.
 const SHORTEST_SEGMENT: usize = 16;
 
@@ -104,7 +104,7 @@ impl Track {
             }
             _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
         };
-        let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [held(a), held(q)]);
+        let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [Held::new(&a), Held::new(&q)]);
         let segments = vec![Segment { range: 0..recording.t_s.len(), role }];
         Ok(Self { name, t_s: recording.t_s, input_rad, segments, stride: 1, source, commands })
     }
@@ -124,19 +124,15 @@ impl Track {
         }
     }
 
-    /// The controllers' outputs at sample `i`, averaged over the `width` samples around it: what a sum over thinned
-    /// samples has to count.
+    /// The controllers' outputs at sample `i`; of samples thinned by `width`, what a sum over them has to count.
     #[inline]
     pub(crate) fn commands(&self, i: usize, width: usize) -> Option<Commands> {
         let [v_as, v_qc] = self.commands.as_ref()?;
-        let last = v_as.len() - 1;
-        let range = i.saturating_sub(width / 2)..(i + width.div_ceil(2)).min(last + 1);
-        let mean = |v: &[f64]| v[range.clone()].iter().sum::<f64>() / range.len() as f64;
-        let (from, to) = (i.saturating_sub(width), (i + width).min(last));
+        let (from, to) = (i.saturating_sub(width), (i + width).min(self.t_s.len() - 1));
         let interval = self.t_s[to] - self.t_s[from];
-        let change = |v: &[f64]| if interval > 0.0 { (v[to] - v[from]) / interval } else { 0.0 };
+        let change = |v: &Held| if interval > 0.0 { (v.at(to) - v.at(from)) / interval } else { 0.0 };
         Some(Commands {
-            now: ControlOutputs { v_as: mean(v_as), v_qc: mean(v_qc) },
+            now: ControlOutputs { v_as: v_as.thinned(i, width), v_qc: v_qc.thinned(i, width) },
             change_per_s: ControlOutputs { v_as: change(v_as), v_qc: change(v_qc) },
         })
     }
@@ -237,17 +233,46 @@ pub(crate) fn wrapped(angle: f64, period: f64) -> f64 {
     angle - period * (angle / period).round()
 }
 
-/// Missing commands take the value that was last given, as a held output does.
-fn held(mut values: Vec<f64>) -> Vec<f64> {
-    let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
-    for v in &mut values {
-        if v.is_finite() {
-            last = *v;
-        } else {
-            *v = last;
-        }
+/// A command as it was held from sample to sample: its running sum.
+#[derive(Debug)]
+struct Held(Vec<f64>);
+
+impl Held {
+    /// Missing values take the one that was last given, as a held output does.
+    fn new(values: &[f64]) -> Self {
+        let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+        let mut sum = 0.0;
+        let sums = values.iter().map(|v| {
+            last = if v.is_finite() { *v } else { last };
+            sum += last;
+            sum
+        });
+        Self(std::iter::once(0.0).chain(sums).collect())
     }
-    values
+
+    fn at(&self, i: usize) -> f64 {
+        self.0[i + 1] - self.0[i]
+    }
+
+    /// The mean of `width` samples around sample `i`; of an even number the outermost two count half.
+    fn mean(&self, i: usize, width: usize) -> f64 {
+        let (half, sums) = (width / 2, &self.0);
+        let odd = sums[i + half + 1] - sums[i - half];
+        let even = 0.5 * (odd + sums[i + half] - sums[i + 1 - half]);
+        (if width % 2 == 0 { even } else { odd }) / width as f64
+    }
+
+    /// What stands for sample `i` among samples thinned by `width`: the mean around it, so that none is lost, less what a
+    /// mean adds to a smooth command, δ²/24 − 3δ⁴/640 in the differences of neighbouring means.
+    fn thinned(&self, i: usize, width: usize) -> f64 {
+        let reach = 2 * width + width / 2;
+        if width == 1 || i < reach || i + reach + 1 >= self.0.len() {
+            return self.at(i);
+        }
+        let around = |steps: usize| self.mean(i - steps * width, width) + self.mean(i + steps * width, width);
+        let (centre, near, far) = (self.mean(i, width), around(1), around(2));
+        centre - (near - 2.0 * centre) / 24.0 + 3.0 / 640.0 * (far - 4.0 * near + 6.0 * centre)
+    }
 }
 
 /// Cuts a run at its gaps and, where `split` is set, at the start of its held-out quarter.
