@@ -142,3 +142,30 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     );
     assert!(failures.is_empty(), "{failures:#?}");
 }
+
+/// Where the readout's gains differ much, the energy command is never along the vibration and turns the pattern by
+/// hundreds of degrees in a run: what the drive does, and when, has to be told as well as what the readout does.
+#[test]
+fn gains_that_differ_by_a_fifth_are_found_as_well_as_they_are_said_to_be() {
+    let all = all(6, |trial| {
+        let ratio = [0.8, 0.87, 0.93, 1.07, 1.13, 1.2][trial as usize];
+        let mut settings = plain_paper();
+        settings.seed = 1 + trial;
+        for e in settings.effects.iter_mut().filter(|e| e.id == EffectId::DetectionGainMismatch) {
+            e.values[0] = ratio;
+        }
+        let angular_gain = settings.angular_gain;
+        let latency = 0.5 / settings.control_hz;
+        let identified = identify(settings).unwrap();
+        let (k, g) = (identified.report.angular_gain, identified.report.detection_gain_ratio.unwrap());
+        let found = identified.calibration.hypothesis.control_latency_s;
+        println!("{ratio}: k {k:?}, g {g:?}, latency {found:.2e} s, {:.3} floors", over_floor(&identified));
+        assert_eq!(identified.steps.len(), 0, "{ratio}");
+        assert!(over_floor(&identified) < 1.1, "{ratio}");
+        assert!((g.value - ratio).abs() < 1e-5 && (k.value - angular_gain).abs() < 2e-6, "{ratio}: {g:?}, {k:?}");
+        assert!((found - latency).abs() < 1e-5, "outputs are held, so that they act half a control period late");
+        [deviations(&g, ratio), deviations(&k, angular_gain)]
+    });
+    let worst = all.iter().flatten().fold(0.0, |m: f64, z| m.max(z.abs()));
+    assert!(worst < 3.5, "{all:?}");
+}

@@ -9,7 +9,7 @@ use crate::error::Refusal;
 use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
 use crate::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::identifiability::Alike;
-use crate::pass::{Pace, walk};
+use crate::pass::{Pace, Start, walk};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 use crate::start::{Ellipse, motion};
 use crate::statistics::{median, robust_deviation, white_noise};
@@ -73,6 +73,8 @@ pub(crate) struct Bench {
     pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
     /// the raw angle could be followed without centring the ellipse
     pub(crate) raw_angle_turns: bool,
+    /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
+    pub(crate) drive_is_free: bool,
 }
 
 impl Bench {
@@ -154,6 +156,7 @@ impl Bench {
             energy_balance: None,
             quadrature_balance: None,
             raw_angle_turns,
+            drive_is_free: false,
         })
     }
 
@@ -162,18 +165,9 @@ impl Bench {
     /// How strong the commands are and how late turns the pattern at a steady rate: k is uncertain by both in any case.
     /// What else they do is left alone unless runs at two or more rates, or in both directions, can tell it.
     pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
-        self.unknowns_of(hypothesis, self.drive_is_told())
-    }
-
-    /// The runs tell what the commands do from the rest.
-    fn drive_is_told(&self) -> bool {
-        self.tracks_differ() && self.excess() < LARGEST_EXCESS
-    }
-
-    fn unknowns_of(&self, hypothesis: &Hypothesis, drive: bool) -> Vec<Unknown> {
         let mut all = vec![Unknown::AngularGain];
         let recorded = self.tracks.iter().any(|t| t.track.has_commands());
-        let commands = drive && recorded;
+        let commands = self.drive_is_free && recorded;
         let quadrature = self.tracks.iter().any(|t| t.track.has_quadrature());
         if self.instrument == Instrument::Gyroscope && recorded {
             all.extend([Unknown::ForceScale, Unknown::ControlLatency]);
@@ -280,12 +274,8 @@ impl Bench {
 
     /// Priors for the unknowns that the data may be silent about.
     pub(crate) fn priors(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Vec<Prior> {
-        self.priors_of(hypothesis, drive, self.drive_is_told())
-    }
-
-    fn priors_of(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, drive_is_free: bool) -> Vec<Prior> {
         let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
-        let considered = !drive_is_free;
+        let considered = !self.drive_is_free;
         let mut all = vec![Prior { considered, ..prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S) }];
         let mut effect = |id, p, mean, deviation| {
             if let Some(member) = hypothesis.position(id) {
@@ -389,6 +379,34 @@ impl Bench {
         }
     }
 
+    /// Fits a hypothesis from where the runs are, moves them there and measures what is left; says whether that is what
+    /// the fit was weighted by.
+    fn fitted(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, effort: Effort) -> (Fit, bool) {
+        let (unknowns, priors) = (self.unknowns(hypothesis), self.priors(hypothesis, drive));
+        let result = fit(&self.tracks, hypothesis, &unknowns, &priors, Role::Fit, effort);
+        for (p, s) in self.tracks.iter_mut().zip(&result.starts) {
+            p.starts.clone_from(s);
+        }
+        let before: Vec<f64> = self.tracks.iter().map(|p| p.noise.angle).collect();
+        self.measure_noise(&result);
+        let settled = self.tracks.iter().zip(before).all(|(p, before)| {
+            let change = p.noise.angle / before;
+            change < SAME_NOISE && change > SAME_NOISE.recip()
+        });
+        (result, settled)
+    }
+
+    /// Noise, limits and starts of the runs.
+    fn state(&self) -> Vec<([Noise; 3], Vec<Start>)> {
+        self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect()
+    }
+
+    fn restore(&mut self, state: Vec<([Noise; 3], Vec<Start>)>) {
+        for (p, ([noise, white, limit], starts)) in self.tracks.iter_mut().zip(state) {
+            (p.noise, p.white, p.limit, p.starts) = (noise, white, limit, starts);
+        }
+    }
+
     /// Measures the noise of every track from what a fit leaves, and sets the limits beyond which a residual is a spike.
     pub(crate) fn measure_noise(&mut self, fit: &Fit) {
         let rests = residuals(&self.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Dense);
@@ -468,6 +486,8 @@ pub(crate) fn declared_hypothesis(start: &Hypothesis) -> Hypothesis {
 
 /// A residual beyond this multiple of its white part is a misfit.
 const LARGEST_EXCESS: f64 = 4.0;
+/// To what share of it the drive has to bring a misfit that it is believed to explain.
+const DRIVES_SHARE: f64 = 0.5;
 /// Rounds of fit, noise and spikes: those that come before the drive is freed with the last, and the most there are.
 const ROUNDS: usize = 3;
 const MOST_ROUNDS: usize = 6;
@@ -475,6 +495,9 @@ const MOST_ROUNDS: usize = 6;
 const SAME_NOISE: f64 = 1.5;
 
 /// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
+///
+/// What the commands do is adjusted last, and only when little else is left or it explains most of what is: it multiplies,
+/// and a misfit would drag it along.
 ///
 /// # Errors
 /// Where a ring-down is not one.
@@ -484,6 +507,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
     if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
         hypothesis.set(Unknown::Effect(member, 0), 1.0);
     }
+    let mut explains = None;
     let mut round = 0;
     loop {
         // the drive first: it multiplies all that the commands do
@@ -503,26 +527,27 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
         }
         bench.balance_quadrature(&hypothesis);
         let last = round + 1 >= ROUNDS;
-        // What the commands do is adjusted last, and only when little else is left: it multiplies, and a misfit would
-        // drag it along.
-        let free_drive = last && bench.tracks_differ() && bench.excess() < LARGEST_EXCESS;
-        let unknowns = bench.unknowns_of(&hypothesis, free_drive);
-        let priors = bench.priors_of(&hypothesis, drive.as_ref(), free_drive);
-        let effort = if last { Effort::FULL } else { Effort::ROUGH };
-        let result = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, effort);
+        bench.drive_is_free =
+            last && bench.tracks_differ() && (explains == Some(true) || bench.excess() < LARGEST_EXCESS);
+        let (result, settled) =
+            bench.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
         hypothesis = result.hypothesis.clone();
-        for (p, s) in bench.tracks.iter_mut().zip(&result.starts) {
-            p.starts.clone_from(s);
-        }
-        let before: Vec<f64> = bench.tracks.iter().map(|p| p.noise.angle).collect();
-        bench.measure_noise(&result);
-        let settled = bench.tracks.iter().zip(before).all(|(p, before)| {
-            let change = p.noise.angle / before;
-            change < SAME_NOISE && change > SAME_NOISE.recip()
-        });
         round += 1;
-        if last && (settled || round == MOST_ROUNDS) {
-            return Ok(Fitted { fit: result, ring_downs, drive });
+        if !last || !(settled || round >= MOST_ROUNDS) {
+            continue;
         }
+        if explains.is_none() && !bench.drive_is_free && bench.tracks_differ() {
+            let (held, before) = (bench.state(), bench.excess());
+            bench.drive_is_free = true;
+            let (freed, _) = bench.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
+            explains = Some(bench.excess() < DRIVES_SHARE * before);
+            if explains == Some(true) {
+                hypothesis = freed.hypothesis;
+                continue;
+            }
+            bench.drive_is_free = false;
+            bench.restore(held);
+        }
+        return Ok(Fitted { fit: result, ring_downs, drive });
     }
 }

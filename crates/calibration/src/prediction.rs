@@ -14,6 +14,8 @@ use crate::unknowns::{Lanes, Unknowns};
 pub(crate) struct Commands {
     pub(crate) now: ControlOutputs<f64>,
     pub(crate) change_per_s: ControlOutputs<f64>,
+    /// how fast the pattern turned that they were computed from, rad/s
+    pub(crate) turn_rad_s: f64,
 }
 
 /// The vibration at one sample, as a hypothesis sees it, with slopes.
@@ -126,9 +128,9 @@ impl<'h> Predictor<'h> {
         let (mut forced, mut forced_slopes) = (None, None);
         if let Some((v, axis)) = commands.zip(seen_axis) {
             if lanes.columns.is_empty() {
-                forced = Some(self.actuation.rate(&v, &axis, at.precession_rad_s, |x| x));
+                forced = Some(self.actuation.rate(&v, &axis, |x| x));
             } else {
-                let rate = self.actuation_of_jets.rate(&v, &axis, at.precession_rad_s, Jet::constant);
+                let rate = self.actuation_of_jets.rate(&v, &axis, Jet::constant);
                 forced = Some(part(&rate, |j| j.value));
                 forced_slopes = Some(rate);
             }
@@ -205,9 +207,9 @@ impl<T: Real> Drive<T> {
     /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
     /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects.
     #[inline]
-    fn rate(&self, v: &Commands, seen: &Direction<f64>, precession_rad_s: f64, lift: impl Fn(f64) -> T) -> Envelope<T> {
+    fn rate(&self, v: &Commands, seen: &Direction<f64>, lift: impl Fn(f64) -> T) -> Envelope<T> {
         let latency = self.control_latency_s;
-        let (sin_late, cos_late) = (latency * lift(precession_rad_s)).sin_cos();
+        let (sin_late, cos_late) = (latency * lift(v.turn_rad_s)).sin_cos();
         let (cos, sin) = (lift(seen.cos), lift(seen.sin));
         let held = |now: f64, change: f64| lift(now) - latency * lift(change);
         let v =

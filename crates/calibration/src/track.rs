@@ -134,7 +134,15 @@ impl Track {
         Some(Commands {
             now: ControlOutputs { v_as: v_as.thinned(i, width), v_qc: v_qc.thinned(i, width) },
             change_per_s: ControlOutputs { v_as: change(v_as), v_qc: change(v_qc) },
+            turn_rad_s: if interval > 0.0 { self.turn(from, to) / interval } else { 0.0 },
         })
+    }
+
+    /// By how much the pattern turned from one sample to another, as it was read, rad within ± a quarter turn.
+    fn turn(&self, from: usize, to: usize) -> f64 {
+        let [before, after] = [from, to].map(|i| self.envelope(i).pendulum());
+        let (sin, cos) = (before.r * after.s - before.s * after.r, before.r * after.r + before.s * after.s);
+        0.5 * sin.atan2(cos)
     }
 
     /// Commands were recorded.
