@@ -10,8 +10,8 @@ its own, on the file as the system has it cached. Wall and processor time and pe
 the wall time of `read_csv` alone is printed too, and it is this that cvg's whole process is compared with.
 
 The instrument behind the recording turns at 500 deg/s with k = 0.78 and detection gains of 1.0132: the loop holds the energy
-that it measures, so that the true one moves and the energy command works; the commands, misaligned by the readout, turn
-the pattern. cvg must find k and the gain ratio and leave no more than the noise, or nothing is printed.
+that it measures, so that the true one moves and the energy command works, recorded as it was given; misaligned by the
+readout, it turns the pattern. cvg must find k and the gain ratio and leave no more than the noise, or nothing is printed.
 """
 
 import argparse

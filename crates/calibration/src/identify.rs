@@ -518,7 +518,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
             Some(d) => {
                 hypothesis.force_scale = d.mean();
                 hypothesis.damping_per_s =
-                    ring_downs.iter().map(|r| 1.0 / r.tau_s).sum::<f64>() / ring_downs.len() as f64;
+                    ring_downs.iter().map(|r| r.tau_s.recip()).sum::<f64>() / ring_downs.len() as f64;
                 if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
                     hypothesis.set(Unknown::Effect(member, 0), d.ratio());
                 }

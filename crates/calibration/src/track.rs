@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use cvg_model::{ControlOutputs, Envelope};
+use rayon::prelude::*;
 
 use crate::error::Refusal;
 use crate::prediction::Commands;
@@ -24,7 +25,9 @@ pub(crate) struct Track {
     /// every how many samples a fit looks at: more than one only in runs of more than [`ENOUGH_SAMPLES`]
     pub(crate) stride: usize,
     source: Source,
-    commands: Option<[Held; 2]>,
+    commands: Option<[Vec<f64>; 2]>,
+    /// how fast the pattern turned as it was read, rad/s, where there are commands
+    turn_rad_s: Vec<f64>,
 }
 
 /// A stretch of a track without a gap: it has one bias.
@@ -104,9 +107,14 @@ impl Track {
             }
             _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
         };
-        let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [Held::new(&a), Held::new(&q)]);
+        let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [held(a), held(q)]);
         let segments = vec![Segment { range: 0..recording.t_s.len(), role }];
-        Ok(Self { name, t_s: recording.t_s, input_rad, segments, stride: 1, source, commands })
+        let (t_s, turn_rad_s) = (recording.t_s, Vec::new());
+        let mut track = Self { name, t_s, input_rad, segments, stride: 1, source, commands, turn_rad_s };
+        if track.has_commands() {
+            track.turn_rad_s = (0..track.t_s.len()).into_par_iter().map(|i| track.turn(i)).collect();
+        }
+        Ok(track)
     }
 
     /// The envelope as the electronics saw it, V (or at nominal amplitude, where only an angle was recorded).
@@ -130,19 +138,20 @@ impl Track {
         let [v_as, v_qc] = self.commands.as_ref()?;
         let (from, to) = (i.saturating_sub(width), (i + width).min(self.t_s.len() - 1));
         let interval = self.t_s[to] - self.t_s[from];
-        let change = |v: &Held| if interval > 0.0 { (v.at(to) - v.at(from)) / interval } else { 0.0 };
+        let change = |v: &[f64]| if interval > 0.0 { (v[to] - v[from]) / interval } else { 0.0 };
         Some(Commands {
-            now: ControlOutputs { v_as: v_as.thinned(i, width), v_qc: v_qc.thinned(i, width) },
+            now: ControlOutputs { v_as: thinned(v_as, i, width), v_qc: thinned(v_qc, i, width) },
             change_per_s: ControlOutputs { v_as: change(v_as), v_qc: change(v_qc) },
-            turn_rad_s: if interval > 0.0 { self.turn(from, to) / interval } else { 0.0 },
+            turn_rad_s: self.turn_rad_s[i],
         })
     }
 
-    /// By how much the pattern turned from one sample to another, as it was read, rad within ± a quarter turn.
-    fn turn(&self, from: usize, to: usize) -> f64 {
+    /// How fast the pattern turned around sample `i`, as it was read, rad/s: less than a quarter turn between samples.
+    fn turn(&self, i: usize) -> f64 {
+        let (from, to) = (i.saturating_sub(1), (i + 1).min(self.t_s.len() - 1));
         let [before, after] = [from, to].map(|i| self.envelope(i).pendulum());
         let (sin, cos) = (before.r * after.s - before.s * after.r, before.r * after.r + before.s * after.s);
-        0.5 * sin.atan2(cos)
+        0.5 * sin.atan2(cos) / (self.t_s[to] - self.t_s[from]).max(f64::MIN_POSITIVE)
     }
 
     /// Commands were recorded.
@@ -241,46 +250,36 @@ pub(crate) fn wrapped(angle: f64, period: f64) -> f64 {
     angle - period * (angle / period).round()
 }
 
-/// A command as it was held from sample to sample: its running sum.
-#[derive(Debug)]
-struct Held(Vec<f64>);
-
-impl Held {
-    /// Missing values take the one that was last given, as a held output does.
-    fn new(values: &[f64]) -> Self {
-        let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
-        let mut sum = 0.0;
-        let sums = values.iter().map(|v| {
-            last = if v.is_finite() { *v } else { last };
-            sum += last;
-            sum
-        });
-        Self(std::iter::once(0.0).chain(sums).collect())
-    }
-
-    fn at(&self, i: usize) -> f64 {
-        self.0[i + 1] - self.0[i]
-    }
-
-    /// The mean of `width` samples around sample `i`; of an even number the outermost two count half.
-    fn mean(&self, i: usize, width: usize) -> f64 {
-        let (half, sums) = (width / 2, &self.0);
-        let odd = sums[i + half + 1] - sums[i - half];
-        let even = 0.5 * (odd + sums[i + half] - sums[i + 1 - half]);
-        (if width % 2 == 0 { even } else { odd }) / width as f64
-    }
-
-    /// What stands for sample `i` among samples thinned by `width`: the mean around it, so that none is lost, less what a
-    /// mean adds to a smooth command, δ²/24 − 3δ⁴/640 in the differences of neighbouring means.
-    fn thinned(&self, i: usize, width: usize) -> f64 {
-        let reach = 2 * width + width / 2;
-        if width == 1 || i < reach || i + reach + 1 >= self.0.len() {
-            return self.at(i);
+/// Missing commands take the value that was last given, as a held output does.
+fn held(mut values: Vec<f64>) -> Vec<f64> {
+    let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+    for v in &mut values {
+        if v.is_finite() {
+            last = *v;
+        } else {
+            *v = last;
         }
-        let around = |steps: usize| self.mean(i - steps * width, width) + self.mean(i + steps * width, width);
-        let (centre, near, far) = (self.mean(i, width), around(1), around(2));
-        centre - (near - 2.0 * centre) / 24.0 + 3.0 / 640.0 * (far - 4.0 * near + 6.0 * centre)
     }
+    values
+}
+
+/// What stands for sample `i` among samples thinned by `width`: the mean around it, so that none is lost, less what a mean
+/// adds to a smooth command, δ²/24 − 3δ⁴/640 in the differences of neighbouring means.
+fn thinned(v: &[f64], i: usize, width: usize) -> f64 {
+    let half = width / 2;
+    let reach = 2 * width + half;
+    if width == 1 || i < reach || i + reach >= v.len() {
+        return v[i];
+    }
+    let mean = |i: usize| {
+        let sum: f64 = v[i - half..=i + half].iter().sum();
+        // of an even number the outermost two count half
+        let shared = if width.is_multiple_of(2) { 0.5 * (v[i - half] + v[i + half]) } else { 0.0 };
+        (sum - shared) / width as f64
+    };
+    let around = |steps: usize| mean(i - steps * width) + mean(i + steps * width);
+    let (centre, near, far) = (mean(i), around(1), around(2));
+    centre - (near - 2.0 * centre) / 24.0 + 3.0 / 640.0 * (far - 4.0 * near + 6.0 * centre)
 }
 
 /// Cuts a run at its gaps and, where `split` is set, at the start of its held-out quarter.
