@@ -542,7 +542,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
             let (freed, _) = bench.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
             explains = Some(bench.excess() < DRIVES_SHARE * before);
             if explains == Some(true) {
-                hypothesis = freed.hypothesis;
+                (hypothesis, round) = (freed.hypothesis, ROUNDS);
                 continue;
             }
             bench.drive_is_free = false;
