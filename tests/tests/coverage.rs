@@ -143,8 +143,8 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// Where the readout's gains differ much, the energy command is never along the vibration and turns the pattern by
-/// hundreds of degrees in a run: what the drive does, and when, has to be told as well as what the readout does.
+/// Where the readout's gains differ much, the energy command is hardly ever along the vibration and turns the pattern as
+/// long as it spins: what the drive does, and when, has to be told as well as what the readout does.
 #[test]
 fn gains_that_differ_by_a_fifth_are_found_as_well_as_they_are_said_to_be() {
     let all = all(6, |trial| {

@@ -51,7 +51,7 @@ pub(crate) fn energy_balance(
     }
     let n = free.len();
     let unknowns = Unknowns::new(hypothesis, free);
-    // the drive replaces the damping, to a part in a million: counted from that, what is left of it shows
+    // the drive replaces the damping and hardly differs from it: counted from that, what is left of it shows
     let replaced = usual_growth(tracks);
     // squares of the slopes and, last, of what is left of ln a
     let mut squares = DMatrix::zeros(n + 1, n + 1);
@@ -85,7 +85,8 @@ pub(crate) fn energy_balance(
     for (unknown, step) in unknowns.all.iter().zip(&step) {
         closed.set(*unknown, closed.get(*unknown) + step);
     }
-    closed.damping_per_s += replaced * step[0];
+    // by as much as the force scale could move: it has a bound
+    closed.damping_per_s += replaced * (closed.force_scale - hypothesis.force_scale);
     Some(EnergyBalance {
         mean_square: left.dot(&(squares * &left)).max(0.0) / f64::max(count, 1.0),
         closed,

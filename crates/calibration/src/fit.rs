@@ -346,7 +346,8 @@ struct Solution {
     covariance: DMatrix<f64>,
 }
 
-/// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that. Considered unknowns, those with a deviation, do not move; what they could be shows in the covariance.
+/// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that. Considered
+/// unknowns, those with a deviation, do not move; what they could be shows in the covariance.
 fn solve(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64, considered: &[Option<f64>]) -> Option<Solution> {
     let n = right.len();
     let free: Vec<usize> = (0..n).filter(|&i| considered[i].is_none()).collect();
