@@ -14,9 +14,11 @@ use crate::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::identifiability::{confounded_with, separated_by};
 use crate::identify::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
 use crate::picture::{Picture, Scene};
+use crate::provenance;
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::{
-    BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA,
+    BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA, Status,
+    Tool,
 };
 use crate::residual::{Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics};
 use crate::stages::stages;
@@ -104,6 +106,7 @@ pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Resul
 fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
+    let inputs = provenance::inputs(&campaign);
     (options.progress)("preparing the runs");
     let mut bench = Bench::new(campaign)?;
     (options.progress)("fitting the declared model");
@@ -187,6 +190,10 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
     let report = Report {
         schema: SCHEMA.into(),
+        status: Status::Answered,
+        reason: None,
+        tool: Tool::default(),
+        inputs,
         device: device.clone(),
         instrument: match bench.instrument {
             Instrument::Gyroscope => "gyroscope".into(),
@@ -213,6 +220,8 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         channels: left,
         unexplained,
         runs,
+        decomposition: Vec::new(),
+        proposals: Vec::new(),
         warnings,
     };
     Ok(Identification {
@@ -264,6 +273,10 @@ fn run_report(run: &crate::recording::Run) -> RunReport {
         rate_dps: None,
         spikes: 0,
         tau_s: None,
+        angular_gain: None,
+        bias_dps: None,
+        rms_deg: None,
+        agrees: None,
     }
 }
 

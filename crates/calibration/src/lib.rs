@@ -53,6 +53,7 @@ mod jet;
 mod pass;
 pub mod picture;
 mod prediction;
+mod provenance;
 pub mod recording;
 pub mod report;
 mod residual;

@@ -7,7 +7,54 @@ use crate::hypothesis::Origin;
 use crate::residual::{Follows, Harmonic};
 
 /// Identifier of the report's format.
-pub const SCHEMA: &str = "cvg.report/1";
+pub const SCHEMA: &str = "cvg.report/2";
+
+/// What came of an identification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// the instrument was identified, and undoing what was found helps on held-out data
+    Answered,
+    /// nothing that was found helps on held-out data: compensating changes nothing
+    Neutral,
+    /// the campaign does not carry an answer
+    Refused,
+}
+
+/// The share of what the declared model leaves that follows one thing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Share {
+    /// pattern, table, time, rate, amplitude, direction, temperature or rest
+    pub of: String,
+    /// share of the variance
+    pub share: f64,
+    /// its 95 % interval
+    pub ci95: [f64; 2],
+}
+
+/// The program that wrote a report.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tool {
+    /// name
+    pub name: String,
+    /// version
+    pub version: String,
+}
+
+impl Default for Tool {
+    fn default() -> Self {
+        Self { name: "cvg".into(), version: env!("CARGO_PKG_VERSION").into() }
+    }
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// file
+    pub file: String,
+    /// CRC-32 (IEEE 802.3) of its bytes, as eight hexadecimal digits; null where they cannot be read twice
+    pub crc32: Option<String>,
+}
 
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -230,6 +277,14 @@ pub struct RunReport {
     pub spikes: usize,
     /// decay time constant, s
     pub tau_s: Option<Estimate>,
+    /// k as this run alone tells it, everything else as all runs have it; null where it does not
+    pub angular_gain: Option<Estimate>,
+    /// bias of this run: precession at rest, as k of all runs leaves it, deg/s
+    pub bias_dps: Option<Estimate>,
+    /// angle error of this run less its best line, deg rms
+    pub rms_deg: Option<f64>,
+    /// it agrees with the other runs; false where it was left out because it does not, null where it was not judged
+    pub agrees: Option<bool>,
 }
 
 /// The report.
@@ -237,6 +292,14 @@ pub struct RunReport {
 pub struct Report {
     /// [`SCHEMA`]
     pub schema: String,
+    /// what came of it
+    pub status: Status,
+    /// why it is not answered; null where it is
+    pub reason: Option<String>,
+    /// the program
+    pub tool: Tool,
+    /// the files that were read
+    pub inputs: Vec<Input>,
     /// name of the instrument
     pub device: String,
     /// gyroscope or sensor
@@ -261,6 +324,10 @@ pub struct Report {
     pub unexplained: Vec<Unexplained>,
     /// the campaign's runs
     pub runs: Vec<RunReport>,
+    /// what the declared residual follows, by shares of its variance; empty where it was not taken apart
+    pub decomposition: Vec<Share>,
+    /// effects that are proposed for the library, each in the form of an effect file
+    pub proposals: Vec<serde_json::Value>,
     /// what a reader must know
     pub warnings: Vec<String>,
 }

@@ -188,7 +188,14 @@ fn assert_string_in(value: &Value, allowed: &[&str], place: &str) {
 
 /// The report has the keys and the types that its readers rely on.
 fn assert_report(r: &Value) {
-    assert_eq!(r["schema"], "cvg.report/1");
+    assert_eq!(r["schema"], "cvg.report/2");
+    assert_string_in(&r["status"], &["answered", "neutral"], "status");
+    assert_eq!(r["status"] == "answered", r["reason"].is_null(), "{}", r["reason"]);
+    assert_eq!(r["tool"]["name"], "cvg");
+    assert!(r["tool"]["version"].is_string() && r["decomposition"].is_array() && r["proposals"].is_array());
+    for input in r["inputs"].as_array().unwrap() {
+        assert!(input["file"].is_string() && input["crc32"].as_str().is_some_and(|sum| sum.len() == 8), "{input}");
+    }
     assert!(r["device"].is_string());
     assert_estimate(&r["angular_gain"], "angular_gain");
     for key in ["detection_gain_ratio", "actuation_gain_ratio"] {
