@@ -77,7 +77,7 @@ def main():
         unfinished = path.with_suffix(".part")
         write_recording(unfinished, options.rows)
         unfinished.rename(path)
-    build = ["cargo", "build", "--release", "--quiet", "-p", "cvg-calibration", "--example", "read_recording"]
+    build = ["cargo", "build", "--release", "--quiet", "-p", "cvg-recording", "--example", "read_recording"]
     subprocess.run(build, cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     commands = {

@@ -54,7 +54,6 @@ mod pass;
 pub mod picture;
 mod prediction;
 mod provenance;
-pub mod recording;
 pub mod report;
 mod residual;
 mod stages;
@@ -66,6 +65,7 @@ mod unexplained;
 mod unknowns;
 
 pub use compensate::compensate;
+pub use cvg_recording as recording;
 pub use error::{Cause, Refusal};
 pub use evaluate::ErrorSize;
 pub use hypothesis::{Hypothesis, Member, Origin, Unknown};

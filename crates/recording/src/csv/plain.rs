@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::cell::{self, Decimal};
 use super::digits::plain_number;
 use super::piece::{Dialect, Piece};
-use crate::recording::layout::Field;
+use crate::layout::Field;
 
 /// Reads the whole lines of `text[range]` into a piece. What is behind the range is looked at and not used.
 ///

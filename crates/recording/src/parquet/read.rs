@@ -13,18 +13,18 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
-use crate::recording::Recording;
-use crate::recording::admission;
-use crate::recording::error::{Place, ReadError};
-use crate::recording::layout::{Field, Layout};
-use crate::recording::naming::Naming;
-use crate::recording::table::{Missing, Places, Table};
-use crate::recording::unknown::Cells;
+use crate::Recording;
+use crate::admission;
+use crate::error::{Place, ReadError};
+use crate::layout::{Field, Layout};
+use crate::naming::Naming;
+use crate::table::{Missing, Places, Table};
+use crate::unknown::Cells;
 
 const BATCH_ROWS: usize = 64 << 10;
 
 /// Reads a recording.
-pub(in crate::recording) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
+pub(crate) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     // The decoder asserts what a damaged file does not hold.
     let decoded = catch_unwind(AssertUnwindSafe(|| decode(file, naming, source)));
     let damaged = |_| ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };

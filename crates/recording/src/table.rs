@@ -83,6 +83,7 @@ impl Table {
 #[derive(Debug)]
 pub(super) enum Places {
     /// Row `n` is row `n` of the file.
+    #[cfg_attr(not(any(feature = "hdf5", feature = "matlab", feature = "parquet")), expect(dead_code))]
     Rows,
     /// (row, its line), for each row that does not stand on the line after the row before it.
     Lines(Vec<(usize, u64)>),

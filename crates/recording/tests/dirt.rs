@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use cvg_calibration::recording::{Channel, Place, ReadError, Recording, Tally};
+use cvg_recording::{Channel, Place, ReadError, Recording, Tally};
 
 const HEADER: &str = "t_s,rate_dps,xc_v,yc_v,vas_v";
 

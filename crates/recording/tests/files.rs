@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Place, Recording, Tally, UnknownColumn};
+use cvg_recording::{Campaign, Channel, Place, Recording, Tally, UnknownColumn};
 use proptest::prelude::*;
 use tempfile::TempDir;
 

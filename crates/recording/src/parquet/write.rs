@@ -12,7 +12,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use crate::recording::{Cells, Outlet, Recording};
+use crate::{Cells, Outlet, Recording};
 
 impl Recording {
     /// Writes the recording as Parquet, in the order of its columns.

@@ -1,4 +1,4 @@
-//! Reads a recording and says how long that took: `cargo run --release -p cvg-calibration --example read_recording -- FILE`.
+//! Reads a recording and says how long that took: `cargo run --release -p cvg-recording --example read_recording -- FILE`.
 //!
 //! Used by `benches/reading.py`. It identifies nothing.
 
@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use cvg_calibration::recording::Recording;
+use cvg_recording::Recording;
 
 fn main() -> ExitCode {
     let Some(path) = std::env::args().nth(1) else {

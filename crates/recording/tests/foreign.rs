@@ -5,7 +5,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use cvg_calibration::recording::{Campaign, Naming, ReadError, Recording};
+use cvg_recording::{Campaign, Naming, ReadError, Recording};
 
 fn naming(entries: &[&str]) -> Naming {
     let mut naming = Naming::default();

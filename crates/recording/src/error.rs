@@ -255,4 +255,11 @@ impl ReadError {
             _ => Self::Io { path, source },
         }
     }
+
+    /// The error for a format that this program was built without.
+    #[cfg(not(all(feature = "hdf5", feature = "matlab", feature = "parquet")))]
+    pub(crate) fn not_built_in(path: &Path, what: &str) -> Self {
+        let wanted = "CSV: this program was built without that format";
+        Self::Format { path: path.to_path_buf(), what: what.to_owned(), wanted }
+    }
 }

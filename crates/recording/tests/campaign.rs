@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Instrument, Role, RunKind};
+use cvg_recording::{Campaign, Instrument, Role, RunKind};
 use tempfile::TempDir;
 
 const ROTATION: &str = "t_s,rate_dps,xc_v,yc_v\n0,500,1,0\n0.5,500,0.9,0.1\n1,500,0.8,0.2\n1.5,500,0.7,0.3\n";

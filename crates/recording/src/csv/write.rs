@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use rayon::prelude::*;
 
-use crate::recording::{Outlet, Recording};
+use crate::{Outlet, Recording};
 
 /// Rows that one thread formats at a time.
 const ROWS: usize = 16 << 10;

@@ -7,8 +7,8 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::piece::{Dialect, Fault, Piece, Short};
-use crate::recording::error::{Place, ReadError};
-use crate::recording::table::{Places, Table};
+use crate::error::{Place, ReadError};
+use crate::table::{Places, Table};
 
 /// A table that grows piece by piece.
 #[derive(Debug)]

@@ -1,10 +1,12 @@
 //! Recordings and campaigns: files in, columns of numbers out, and what is wrong with a file and where.
 //!
-//! A recording is read from CSV (RFC 4180 and its usual dialects), Parquet, MATLAB's `.mat` or HDF5. Dirt that has one meaning is handled: rows
-//! without a time, a reference or an angle, repeated time stamps and a cut-off last line are dropped, counted
-//! ([`Dropped`]) and said in [`Recording::warnings`]. Dirt that could mean two things is refused with file, line and
-//! column ([`ReadError`]). No value is ever changed or made up, and nothing here judges the instrument: spikes, rates
-//! and angles are the identification's.
+//! A recording is read from CSV (RFC 4180 and its usual dialects), Parquet, MATLAB's `.mat` or HDF5, the last three by
+//! features of their names, all on by default. Dirt that has one meaning is handled: rows without a time, a reference or
+//! an angle, repeated time stamps and a cut-off last line are dropped, counted ([`Dropped`]) and said in
+//! [`Recording::warnings`]. Dirt that could mean two things is refused with file, line and column ([`ReadError`]). No
+//! value is ever changed or made up, and nothing here judges the instrument: spikes, rates and angles are the
+//! identification's.
+#![forbid(unsafe_code)]
 
 mod admission;
 mod arrays;

@@ -40,10 +40,10 @@ impl Recording {
         (&mut file).take(HEAD).read_to_end(&mut head).map_err(io)?;
         let mut recording = if head.starts_with(b"PAR1") {
             parquet::read(file, naming, path)?
-        } else if arrays::is_mat_5(&head) || arrays::is_hdf5(&head) {
+        } else if arrays::is_one(&head) {
             let mut bytes = head;
             file.read_to_end(&mut bytes).map_err(io)?;
-            containers(bytes, naming, path)?
+            arrays::read(bytes, naming, path)?
         } else {
             refuse_other_kinds(&head, path)?;
             let size = metadata.is_file().then_some(metadata.len());
@@ -62,10 +62,10 @@ impl Recording {
         let io = |error| ReadError::io(source, error);
         let mut head = Vec::with_capacity(16);
         (&mut reader).take(HEAD).read_to_end(&mut head).map_err(io)?;
-        let mut recording = if arrays::is_mat_5(&head) || arrays::is_hdf5(&head) {
+        let mut recording = if arrays::is_one(&head) {
             let mut bytes = head;
             reader.read_to_end(&mut bytes).map_err(io)?;
-            containers(bytes, naming, source)?
+            arrays::read(bytes, naming, source)?
         } else if head.starts_with(b"PAR1") {
             let what = "is Parquet, which is read from its end".to_owned();
             return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
@@ -84,14 +84,6 @@ impl Recording {
     pub fn parse_csv(bytes: &[u8], source: &Path) -> Result<Self, ReadError> {
         refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
         csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
-    }
-}
-
-fn containers(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
-    if arrays::is_mat_5(&bytes) {
-        arrays::read_mat_5(&bytes, naming, source)
-    } else {
-        arrays::read_hdf5(bytes, naming, source)
     }
 }
 

@@ -8,9 +8,9 @@ use std::path::Path;
 
 use super::blocks::LONGEST_LINE;
 use super::record::{Record, Records};
-use crate::recording::error::ReadError;
-use crate::recording::layout::Layout;
-use crate::recording::naming::Naming;
+use crate::error::ReadError;
+use crate::layout::Layout;
+use crate::naming::Naming;
 
 const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 

@@ -9,8 +9,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{Instrument, Role, RunKind};
-use crate::recording::error::ReadError;
-use crate::recording::naming::Naming;
+use crate::error::ReadError;
+use crate::naming::Naming;
 
 /// A place in the campaign file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 //! row that is too short is held back here and judged in `assembly.rs`.
 
 use super::cell::{self, Cell, Decimal};
-use crate::recording::layout::{Field, Layout};
-use crate::recording::table::Missing;
-use crate::recording::unknown::Cells;
+use crate::layout::{Field, Layout};
+use crate::table::Missing;
+use crate::unknown::Cells;
 
 /// How to read the rows of a file.
 #[derive(Debug, Clone, Copy)]
