@@ -3,26 +3,28 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Shown};
 use nalgebra::DMatrix;
 
-use crate::actuation::RingDown;
-use crate::calibration::Calibration;
-use crate::channels::channels;
-use crate::discovery::{Step, discover};
+use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::diagnostics::picture::{Picture, Scene};
+use crate::diagnostics::residual::{
+    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
+};
 use crate::error::Refusal;
-use crate::evaluate::{Evaluation, evaluate};
-use crate::fit::{Fit, Window, block_covariance};
-use crate::hypothesis::{Hypothesis, Member, Origin, Unknown};
-use crate::identifiability::{confounded_with, separated_by};
-use crate::identify::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
-use crate::picture::{Picture, Scene};
-use crate::provenance;
+use crate::estimation::actuation::RingDown;
+use crate::estimation::fit::{Fit, Window, block_covariance};
+use crate::estimation::identifiability::{confounded_with, separated_by};
+use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Campaign, Instrument, Role};
+use crate::report::calibration::Calibration;
+use crate::report::channels::channels;
+use crate::report::provenance;
+use crate::report::stages::stages;
+use crate::report::unexplained::{described, unexplained};
 use crate::report::{
     BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA, Status,
     Tool,
 };
-use crate::residual::{Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics};
-use crate::stages::stages;
-use crate::unexplained::{described, unexplained};
+use crate::selection::discovery::{Step, discover};
 
 /// How an identification is run.
 pub struct Options<'a> {

@@ -33,42 +33,24 @@
 //! This crate knows nothing of the simulator, and renders nothing.
 #![forbid(unsafe_code)]
 
-pub mod actuation;
-mod balance;
-pub mod bias;
-pub mod calibration;
-mod candidates;
-mod channels;
-mod compensate;
-mod consistency;
-pub mod discovery;
+mod data;
+mod diagnostics;
 mod error;
-mod evaluate;
-mod fit;
-mod hypothesis;
-pub mod identifiability;
+mod estimation;
 mod identification;
-mod identify;
-mod jet;
-mod pass;
-pub mod picture;
-mod prediction;
-mod provenance;
+mod model;
 pub mod report;
-mod residual;
-mod stages;
-mod start;
-mod statistics;
-mod sums;
-mod track;
-mod unexplained;
-mod unknowns;
+mod selection;
 
-pub use compensate::compensate;
 pub use cvg_recording as recording;
+pub use diagnostics::evaluate::ErrorSize;
+pub use diagnostics::picture;
+pub use diagnostics::residual::{Follows, Harmonic};
 pub use error::{Cause, Refusal};
-pub use evaluate::ErrorSize;
-pub use hypothesis::{Hypothesis, Member, Origin, Unknown};
+pub use estimation::joint_fit::belief;
+pub use estimation::{actuation, bias, identifiability};
 pub use identification::{BiasCurve, Figures, Identification, Options, identify, identify_with_picture};
-pub use identify::belief;
-pub use residual::{Follows, Harmonic};
+pub use model::hypothesis::{Hypothesis, Member, Origin, Unknown};
+pub use report::calibration;
+pub use report::compensate::compensate;
+pub use selection::discovery;

@@ -5,9 +5,9 @@ use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::evaluate::Evaluation;
-use crate::fit::Residual;
-use crate::statistics::median;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::estimation::fit::Residual;
+use crate::estimation::statistics::median;
 
 /// What a harmonic follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -106,7 +106,10 @@ pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u3
         .segments
         .iter()
         .flat_map(|s| {
-            s.base(of).windows(2).take(2000).map(|w| crate::track::wrapped(w[1] - w[0], std::f64::consts::TAU).abs())
+            s.base(of)
+                .windows(2)
+                .take(2000)
+                .map(|w| crate::data::track::wrapped(w[1] - w[0], std::f64::consts::TAU).abs())
         })
         .filter(|d| *d > 1e-9)
         .collect();

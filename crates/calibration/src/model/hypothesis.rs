@@ -1,8 +1,8 @@
 //! A hypothesis: the instrument as it is believed to be, with a value for everything that a fit may adjust.
 //!
 //! Its members are effects of the library and nothing else. Undoing the readout effects gives the vibration; the
-//! input, mechanics and actuation effects say how that vibration must move. [`crate::prediction`] says both of one
-//! sample, with slopes; [`crate::pass`] strings samples together.
+//! input, mechanics and actuation effects say how that vibration must move. [`crate::model::prediction`] says both of one
+//! sample, with slopes; [`crate::estimation::propagation`] strings samples together.
 
 use cvg_estimator::direction::major_axis;
 use cvg_model::effects::{EffectId, Moment, Role, Stage, Values};

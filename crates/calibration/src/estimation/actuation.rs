@@ -7,11 +7,11 @@ pub use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::effects::Moment;
 use nalgebra::{Matrix2, Vector2};
 
+use crate::data::track::wrapped;
 use crate::error::Refusal;
-use crate::hypothesis::Hypothesis;
+use crate::estimation::statistics::{line, robust_deviation};
+use crate::model::hypothesis::Hypothesis;
 use crate::recording::{Run, RunKind};
-use crate::statistics::{line, robust_deviation};
-use crate::track::wrapped;
 
 /// What one ring-down tells.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +46,7 @@ const KEPT_POINTS: usize = 400;
 /// # Errors
 /// Where the pattern turns, lies at another angle, does not decay, or too little was recorded.
 pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal> {
-    let name = crate::track::run_name(run);
+    let name = crate::data::track::run_name(run);
     let RunKind::Ringdown { angle_deg, energy_off_s } = run.kind else {
         return Err(Refusal::new(&name, "is not a ring-down", "kind = \"ringdown\""));
     };
@@ -90,7 +90,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         }
     }
     let mut sorted = off_angle.clone();
-    let middle = crate::statistics::median(&mut sorted);
+    let middle = crate::estimation::statistics::median(&mut sorted);
     let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
     if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
         return refuse(
@@ -118,7 +118,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             break (rate, error);
         }
     };
-    let level = crate::statistics::median(&mut on.1.clone());
+    let level = crate::estimation::statistics::median(&mut on.1.clone());
     let keep = without_spikes(&on.0, &on.1, |_| level);
     for column in [&mut on.0, &mut on.1, &mut on.2] {
         retain(column, &keep);

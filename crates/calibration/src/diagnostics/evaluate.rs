@@ -1,13 +1,13 @@
 //! The error of a hypothesis on data that was not fitted: angle minus the best line, with angular gain and bias
 //! refitted on the same samples, after the hypothesis has removed what it knows.
 
-use crate::bias::angle_dependent_bias;
-use crate::fit::{Prepared, Residual, Window, residuals};
-use crate::hypothesis::Hypothesis;
-use crate::pass::Start;
+use crate::data::track::wrapped;
+use crate::estimation::bias::angle_dependent_bias;
+use crate::estimation::fit::{Prepared, Residual, Window, residuals};
+use crate::estimation::propagation::Start;
+use crate::estimation::statistics::{circular_mean, line, robust_deviation, white_noise};
+use crate::model::hypothesis::Hypothesis;
 use crate::recording::Role;
-use crate::statistics::{circular_mean, line, robust_deviation, white_noise};
-use crate::track::wrapped;
 
 /// Residuals further out than this many robust deviations are spikes.
 const SPIKE: f64 = 6.0;

@@ -5,12 +5,12 @@
 use cvg_model::effects::{EffectId, Moment};
 use nalgebra::{Matrix5, Vector5};
 
+use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
-use crate::hypothesis::{Hypothesis, Origin};
-use crate::pass::Start;
+use crate::estimation::propagation::Start;
+use crate::estimation::statistics::{circular_mean, line, median, robust_deviation};
+use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::Instrument;
-use crate::statistics::{circular_mean, line, median, robust_deviation};
-use crate::track::{Track, wrapped};
 
 /// An ellipse through the readout of all tracks, as offsets, skew and gain ratio of a circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,7 +156,7 @@ pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, given: Option<f64>)
 }
 
 /// Median ln of the amplitude over a segment.
-fn mean_ln_amplitude(track: &Track, segment: &crate::track::Segment, hypothesis: &Hypothesis) -> f64 {
+fn mean_ln_amplitude(track: &Track, segment: &crate::data::track::Segment, hypothesis: &Hypothesis) -> f64 {
     let stride = (segment.range.len() / 1000).max(1);
     let mut values: Vec<f64> = segment
         .range

@@ -3,13 +3,13 @@
 
 use cvg_model::effects::Moment;
 
-use crate::calibration::Calibration;
+use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
-use crate::pass::{Pace, Start, walk};
-use crate::prediction::Predictor;
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::model::prediction::Predictor;
+use crate::model::unknowns::Unknowns;
 use crate::recording::{Recording, Role, Run, RunKind};
-use crate::track::{Track, wrapped};
-use crate::unknowns::Unknowns;
+use crate::report::calibration::Calibration;
 
 /// Compensates a recording.
 ///

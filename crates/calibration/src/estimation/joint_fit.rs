@@ -3,18 +3,18 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::actuation::{DriveGains, RingDown, ring_down};
-use crate::balance::energy_balance;
+use crate::data::track::Track;
 use crate::error::Refusal;
-use crate::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
-use crate::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::identifiability::Alike;
-use crate::pass::{Pace, Start, walk};
+use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
+use crate::estimation::amplitude_equation::energy_balance;
+use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
+use crate::estimation::identifiability::Alike;
+use crate::estimation::initial_guess::{Ellipse, motion};
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::statistics::{median, robust_deviation, white_noise};
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+use crate::model::unknowns::Unknowns;
 use crate::recording::{Campaign, Instrument, Role, RunKind};
-use crate::start::{Ellipse, motion};
-use crate::statistics::{median, robust_deviation, white_noise};
-use crate::track::Track;
-use crate::unknowns::Unknowns;
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
 pub mod belief {

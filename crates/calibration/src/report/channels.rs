@@ -15,19 +15,19 @@ use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
-use crate::balance::energy_balance;
-use crate::evaluate::Evaluation;
-use crate::fit::{Fit, Residual};
-use crate::hypothesis::Hypothesis;
-use crate::identify::Bench;
-use crate::pass::{Pace, Row, walk};
-use crate::recording::{Instrument, Role};
-use crate::report::{ChannelHarmonic, ChannelLine, ChannelReport, Exponent, HarmonicScaling};
-use crate::residual::{
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{
     Along, Follows, Harmonic, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, harmonics, inflation,
     ljung_box, resolved_harmonics, strongest_line, white_band,
 };
-use crate::unknowns::Unknowns;
+use crate::estimation::amplitude_equation::energy_balance;
+use crate::estimation::fit::{Fit, Residual};
+use crate::estimation::joint_fit::Bench;
+use crate::estimation::propagation::{Pace, Row, walk};
+use crate::model::hypothesis::Hypothesis;
+use crate::model::unknowns::Unknowns;
+use crate::recording::{Instrument, Role};
+use crate::report::{ChannelHarmonic, ChannelLine, ChannelReport, Exponent, HarmonicScaling};
 
 /// Harmonics of the pattern and of the table that are looked at.
 const HARMONICS: u32 = 8;
@@ -80,15 +80,15 @@ fn v_qc(sample: &Sample<'_>) -> f64 {
 pub(crate) fn channels(bench: &Bench, fit: &Fit, stage: &str, angle: &Evaluation) -> Vec<ChannelReport> {
     let closed = energy_balance(&bench.tracks, &fit.hypothesis, &fit.starts)
         .map_or_else(|| fit.hypothesis.clone(), |balance| balance.closed);
-    let all = |f: fn(&crate::track::Track) -> bool| bench.tracks.iter().all(|p| f(&p.track));
+    let all = |f: fn(&crate::data::track::Track) -> bool| bench.tracks.iter().all(|p| f(&p.track));
     let gyroscope = bench.instrument == Instrument::Gyroscope;
-    let commands = gyroscope && all(crate::track::Track::has_commands) && closed.force_scale != 0.0;
+    let commands = gyroscope && all(crate::data::track::Track::has_commands) && closed.force_scale != 0.0;
     let recorded = [
-        (all(crate::track::Track::has_amplitude), Channel { name: "amplitude", unit: "1", of: amplitude }),
+        (all(crate::data::track::Track::has_amplitude), Channel { name: "amplitude", unit: "1", of: amplitude }),
         (commands, Channel { name: "vas", unit: "1/s", of: v_as }),
         (commands, Channel { name: "vqc", unit: "1/s", of: v_qc }),
         (
-            gyroscope && all(crate::track::Track::has_quadrature),
+            gyroscope && all(crate::data::track::Track::has_quadrature),
             Channel { name: "quadrature", unit: "1", of: quadrature },
         ),
     ];
@@ -186,7 +186,7 @@ fn of_a_harmonic(e: &Evaluation, frequency_hz: f64) -> bool {
             return false;
         }
         let turns = |angle: &[f64]| {
-            let steps = angle.windows(2).map(|w| crate::track::wrapped(w[1] - w[0], std::f64::consts::TAU));
+            let steps = angle.windows(2).map(|w| crate::data::track::wrapped(w[1] - w[0], std::f64::consts::TAU));
             (steps.sum::<f64>() / std::f64::consts::TAU / time).abs()
         };
         [turns(&s.direction), turns(&s.table)].into_iter().filter(|f| *f > 0.0).any(|f| {

@@ -4,17 +4,19 @@
 use cvg_model::effects::{EffectId, Moment, Scaling};
 use nalgebra::DMatrix;
 
-use crate::evaluate::Evaluation;
-use crate::fit::Fit;
-use crate::hypothesis::{Hypothesis, Unknown};
-use crate::identify::Bench;
-use crate::pass::{Pace, Start, walk};
-use crate::prediction::{Predictor, Vibration};
+use crate::data::track::wrapped;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{
+    Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band,
+};
+use crate::estimation::fit::Fit;
+use crate::estimation::joint_fit::Bench;
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::statistics::{circular_mean, line};
+use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::model::prediction::{Predictor, Vibration};
+use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Role};
-use crate::residual::{Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band};
-use crate::statistics::{circular_mean, line};
-use crate::track::wrapped;
-use crate::unknowns::Unknowns;
 
 /// Curves for the figures of a report.
 #[derive(Debug, Clone, Default)]

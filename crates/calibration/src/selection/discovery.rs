@@ -8,17 +8,17 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
 use rayon::prelude::*;
 
-use crate::balance::energy_balance;
-use crate::candidates::{Candidate, candidates};
-use crate::consistency::doubt;
+use crate::diagnostics::evaluate::{ErrorSize, Evaluation, evaluate};
+use crate::diagnostics::residual::{Harmonic, WHITENESS_LAGS, autocorrelation, inflation, pattern_harmonics};
 use crate::error::Refusal;
-use crate::evaluate::{ErrorSize, Evaluation, evaluate};
-use crate::fit::{Effort, Fit, Window, fit};
-use crate::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::identify::{Bench, Fitted, fit_with_ring_downs};
+use crate::estimation::amplitude_equation::energy_balance;
+use crate::estimation::fit::{Effort, Fit, Window, fit};
+use crate::estimation::initial_guess::Ellipse;
+use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
-use crate::residual::{Harmonic, WHITENESS_LAGS, autocorrelation, inflation, pattern_harmonics};
-use crate::start::Ellipse;
+use crate::selection::candidates::{Candidate, candidates};
+use crate::selection::consistency::doubt;
 
 /// Gain in log-likelihood (×2, after the price of parameters and of the search) that a new effect must bring.
 pub const LEAST_GAIN: f64 = 12.0;

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::evaluate::ErrorSize;
-use crate::hypothesis::Origin;
-use crate::residual::{Follows, Harmonic};
+use crate::diagnostics::evaluate::ErrorSize;
+use crate::diagnostics::residual::{Follows, Harmonic};
+use crate::model::hypothesis::Origin;
 
 /// Identifier of the report's format.
 pub const SCHEMA: &str = "cvg.report/2";

@@ -5,12 +5,12 @@
 
 use cvg_model::effects::EffectId;
 
-use crate::evaluate::{Evaluation, evaluate};
-use crate::fit::{Fit, Window};
-use crate::hypothesis::Origin;
-use crate::identify::Bench;
+use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
+use crate::estimation::fit::{Fit, Window};
+use crate::estimation::joint_fit::Bench;
+use crate::model::hypothesis::Origin;
 use crate::recording::Role;
-use crate::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
 const TOLERATED_SHARE: f64 = 0.15;

@@ -8,12 +8,12 @@
 use cvg_model::Envelope;
 use cvg_model::effects::Moment;
 
-use crate::hypothesis::Hypothesis;
-use crate::jet::Jet;
-use crate::prediction::{Predictor, Vibration, quantity};
+use crate::data::track::{Segment, Track, wrapped};
+use crate::model::hypothesis::Hypothesis;
+use crate::model::jet::Jet;
+use crate::model::prediction::{Predictor, Vibration, quantity};
+use crate::model::unknowns::Unknowns;
 use crate::recording::Instrument;
-use crate::track::{Segment, Track, wrapped};
-use crate::unknowns::Unknowns;
 
 /// What a pass says of one sample.
 #[derive(Debug)]

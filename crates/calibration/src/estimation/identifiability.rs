@@ -3,7 +3,7 @@
 use cvg_model::effects::{EffectId, Stage};
 use nalgebra::DMatrix;
 
-use crate::hypothesis::{Hypothesis, Unknown};
+use crate::model::hypothesis::{Hypothesis, Unknown};
 
 /// Correlation beyond which two effects count as confounded.
 pub const CONFOUNDED: f64 = 0.95;

@@ -1,6 +1,6 @@
 //! The joint fit of a hypothesis to all runs: Gauss–Newton on robustly weighted residuals, one bias per segment.
 //!
-//! Residuals are those of [`crate::pass`]; the biases are eliminated in closed form ([`crate::sums`]), so that the system
+//! Residuals are those of [`crate::estimation::propagation`]; the biases are eliminated in closed form ([`crate::estimation::sums`]), so that the system
 //! to solve has only the unknowns of the instrument. Weak, stated priors keep what the data cannot tell at its neutral value; how
 //! much narrower than its prior an unknown became is how much the data told of it.
 
@@ -8,13 +8,13 @@ use cvg_model::effects::{Role as ParameterRole, Stage};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::hypothesis::{Hypothesis, Unknown, direction};
-use crate::pass::{Pace, Start, walk};
+use crate::data::track::{Segment, Track};
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::statistics::circular_mean;
+use crate::estimation::sums::Sums;
+use crate::model::hypothesis::{Hypothesis, Unknown, direction};
+use crate::model::unknowns::Unknowns;
 use crate::recording::Role;
-use crate::statistics::circular_mean;
-use crate::sums::Sums;
-use crate::track::{Segment, Track};
-use crate::unknowns::Unknowns;
 
 /// A Gaussian belief about an unknown before the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -485,7 +485,7 @@ impl Residual {
         Self { track, samples: segment.range.len(), ..Self::default() }
     }
 
-    pub(crate) fn push(&mut self, track: &Track, row: &crate::pass::Row<'_>) {
+    pub(crate) fn push(&mut self, track: &Track, row: &crate::estimation::propagation::Row<'_>) {
         self.t_s.push(track.t_s[row.index]);
         self.turned.push(row.turned);
         self.table.push(track.input_rad[row.index]);

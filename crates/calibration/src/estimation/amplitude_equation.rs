@@ -8,12 +8,12 @@
 use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::{Prepared, scaled_inverse};
-use crate::hypothesis::{Hypothesis, Unknown};
-use crate::pass::{Pace, Start, walk};
+use crate::estimation::fit::{Prepared, scaled_inverse};
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::statistics::median;
+use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Role};
-use crate::statistics::median;
-use crate::unknowns::Unknowns;
 
 /// The energy balance of a hypothesis, with the force scale, the damping and the anisodamping that close it best.
 #[derive(Debug, Clone)]

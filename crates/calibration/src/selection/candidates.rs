@@ -3,11 +3,13 @@
 
 use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values, harmonic_n};
 
-use crate::evaluate::Evaluation;
-use crate::hypothesis::Hypothesis;
-use crate::identify::Bench;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{
+    Along, Follows, drift_power, resolved_harmonics, strongest_harmonics, strongest_line,
+};
+use crate::estimation::joint_fit::Bench;
+use crate::model::hypothesis::Hypothesis;
 use crate::recording::Instrument;
-use crate::residual::{Along, Follows, drift_power, resolved_harmonics, strongest_harmonics, strongest_line};
 
 /// Harmonics of the pattern and of the table that are looked at.
 const PATTERN_HARMONICS: u32 = 24;

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use crate::pass::Start;
+use crate::estimation::propagation::Start;
 
 /// Weighted sums of one segment: Σ w v vᵀ with v = (1, time, slopes …, residual), for angle and amplitude apart.
 pub(crate) struct Sums {

@@ -4,10 +4,10 @@ use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Stage, Values};
 use cvg_model::{ActuationGains, ControlOutputs, Envelope, Real};
 
-use crate::hypothesis::{Hypothesis, Unknown};
-use crate::jet::Jet;
+use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::model::jet::Jet;
+use crate::model::unknowns::{Lanes, Unknowns};
 use crate::recording::Instrument;
-use crate::unknowns::{Lanes, Unknowns};
 
 /// The controllers' outputs around one sample, V and V/s.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,7 @@ use cvg_model::{ControlOutputs, Envelope};
 use rayon::prelude::*;
 
 use crate::error::Refusal;
-use crate::prediction::Commands;
+use crate::model::prediction::Commands;
 use crate::recording::{Recording, Role, Run};
 
 /// A rotation run, ready for a fit.
@@ -92,7 +92,7 @@ impl Track {
     /// # Errors
     /// Where there is no angle.
     pub(crate) fn whole(run: Run, period_rad: f64) -> Result<Self, Refusal> {
-        let name = crate::track::run_name(&run);
+        let name = crate::data::track::run_name(&run);
         let role = run.role;
         let amplitude = run.amplitude;
         let mut recording = run.recording;

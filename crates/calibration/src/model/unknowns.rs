@@ -2,8 +2,8 @@
 
 use cvg_model::effects::{MAX_PARAMETERS, Stage, Values};
 
-use crate::hypothesis::{Hypothesis, Member, Unknown};
-use crate::jet::{Jet, LANES};
+use crate::model::hypothesis::{Hypothesis, Member, Unknown};
+use crate::model::jet::{Jet, LANES};
 
 /// Up to [`LANES`] unknowns that are differentiated against together.
 #[derive(Debug, Clone, Default)]

@@ -2,15 +2,15 @@
 
 use cvg_model::effects::{EffectId, harmonic_n};
 
-use crate::discovery::Step;
-use crate::evaluate::Evaluation;
-use crate::hypothesis::{Hypothesis, Member, Origin};
-use crate::identify::Bench;
-use crate::report::Unexplained;
-use crate::residual::{
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{
     Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
     strongest_line,
 };
+use crate::estimation::joint_fit::Bench;
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::report::Unexplained;
+use crate::selection::discovery::Step;
 
 /// A line's power over the mean square of the residual, from which it is no accident among those that were looked at:
 /// exp(−power/2) times their number is below one in a thousand.

@@ -1,10 +1,10 @@
 //! From the raw angle to the last effect: the held-out error at every step, with what speaks for the step.
 
-use crate::discovery::Step;
-use crate::evaluate::Evaluation;
-use crate::hypothesis::Origin;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{Follows, reported_harmonics};
+use crate::model::hypothesis::Origin;
 use crate::report::{Rival, StepReport};
-use crate::residual::{Follows, reported_harmonics};
+use crate::selection::discovery::Step;
 
 /// The steps of a report. The noise of every one is that of the last: what the others have besides is no noise.
 pub(crate) fn stages(

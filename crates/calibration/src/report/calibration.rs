@@ -8,7 +8,7 @@ use cvg_model::effects::EffectId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
-use crate::hypothesis::{Hypothesis, Member, Origin};
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::Instrument;
 
 /// Identifier of the format.

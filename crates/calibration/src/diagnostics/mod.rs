@@ -1,0 +1,5 @@
+//! What a fit leaves: its size on held-out data, its harmonics and lines, and the figures that show it.
+
+pub(crate) mod evaluate;
+pub mod picture;
+pub(crate) mod residual;

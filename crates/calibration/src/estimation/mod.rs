@@ -1,0 +1,12 @@
+//! The values of what is believed: a hypothesis propagated along the runs, and the fit that leaves the least.
+
+pub mod actuation;
+pub(crate) mod amplitude_equation;
+pub mod bias;
+pub(crate) mod fit;
+pub mod identifiability;
+pub(crate) mod initial_guess;
+pub(crate) mod joint_fit;
+pub(crate) mod propagation;
+pub(crate) mod statistics;
+pub(crate) mod sums;

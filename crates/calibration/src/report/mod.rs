@@ -1,0 +1,11 @@
+//! What was found, as facts that can be written: the report, the calibration, and recordings with the errors taken out.
+
+pub mod calibration;
+pub(crate) mod channels;
+pub(crate) mod compensate;
+mod facts;
+pub(crate) mod provenance;
+pub(crate) mod stages;
+pub(crate) mod unexplained;
+
+pub use facts::*;

@@ -1,0 +1,5 @@
+//! Which effects are there: what a residual proposes, what is adopted of it, and whether every run shows it.
+
+pub(crate) mod candidates;
+pub(crate) mod consistency;
+pub mod discovery;
