@@ -39,9 +39,16 @@ proptest! {
     //= specs/equation-01.md#the-gain-keeps-its-sign
     //= type=test
     //# Reversing the input MUST reverse the change of the pattern angle and leave the effective angular gain as it was.
+    /// The gain is read back from the turn of the pattern, in either direction: it is the device's own, with its sign.
     #[test]
-    fn prop_reversing_the_input_reverses_the_pattern(gain in 0.01..1.0_f64, input in -1e3..1e3_f64) {
-        prop_assert_eq!(pattern_angle(gain, -input, 0.0), -pattern_angle(gain, input, 0.0));
+    fn prop_reversing_the_input_reverses_the_pattern_and_keeps_the_gain(
+        gain in prop_oneof![0.01..1.0_f64, -1.0..-0.01_f64], input in 1e-2..1e3_f64, bias in -PI..PI,
+    ) {
+        let turned = |input: f64| pattern_angle(gain, input, bias) - pattern_angle(gain, 0.0, bias);
+        prop_assert_near!(turned(-input), -turned(input), 2.0 * BIAS.f64 * (1.0 + input));
+        for input in [input, -input] {
+            prop_assert_near!(-turned(input) / input, gain, 4.0 * f64::EPSILON * (PI / input.abs() + 1.0));
+        }
     }
 
     //= specs/equation-01.md#the-bias-is-what-the-best-line-leaves
@@ -90,7 +97,7 @@ proptest! {
 }
 
 #[test]
-fn prop_a_harmonic_of_the_pattern_survives_the_line() {
+fn a_harmonic_of_the_pattern_survives_the_line() {
     let input: Vec<f64> = (0..10_000).map(|n| f64::from(n) * 20.0 * PI / 10_000.0).collect();
     let angle: Vec<_> = input.iter().map(|&i| pattern_angle(0.78, i, 0.2) + 0.01 * (4.0 * i).cos()).collect();
     let bias = angle_dependent_bias(&input, &angle);

@@ -39,10 +39,15 @@ fn identity_the_pattern_turns_against_the_input_twin() {
     rejects(WRONG, the_pattern_turns_against_the_input);
 }
 
+/// The gain that is read from a turn of the pattern, −(θ − θ_b)/∫Ω dt, is the device's in either direction.
 fn reversing_the_input_reverses_the_pattern(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
-    let [gain, input, bias] = any();
+    let ([gain, _, bias], input) = (any(), Exact::nonzero("∫Ω dt, not 0"));
     let change = |input: Exact| pattern_angle(gain, input, bias) - bias;
-    proof.equal("change", change(-input), -planted * change(input))
+    proof.equal("change", change(-input), -planted * change(input))?;
+    for input in [input, -input] {
+        proof.equal("gain", -change(input) / input, planted * gain)?;
+    }
+    Ok(())
 }
 
 //= specs/equation-01.md#the-gain-keeps-its-sign

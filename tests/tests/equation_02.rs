@@ -124,14 +124,14 @@ for_each_scalar! {
 //= type=test
 //# The quadrature MUST be positive where Y follows X by a quarter of a period.
 #[test]
-fn prop_the_sense_of_circulation_is_the_sign_of_the_quadrature() {
+fn the_sense_of_circulation_is_the_sign_of_the_quadrature() {
     // x = cos φ, y = ½ sin φ runs counter-clockwise: y is positive a quarter period after x.
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, 0.5).pendulum().q, 1.0);
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, -0.5).pendulum().q, -1.0);
 }
 
 #[test]
-fn prop_a_vibration_ahead_of_the_reference_has_negative_l() {
+fn a_vibration_ahead_of_the_reference_has_negative_l() {
     // x = cos(φ + δ) = cos δ cos φ − sin δ sin φ
     let delta = 0.1_f64;
     let p = Envelope::new(delta.cos(), -delta.sin(), 0.0, 0.0).pendulum();

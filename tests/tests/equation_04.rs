@@ -138,13 +138,13 @@ proptest! {
 //= type=test
 //# The angle of a circular orbit MUST be zero.
 #[test]
-fn prop_a_circular_orbit_has_no_orientation_and_gives_zero() {
+fn a_circular_orbit_has_no_orientation_and_gives_zero() {
     assert_eq!(Envelope::new(1.0, 0.0, 0.0, 1.0).pendulum().angle(), 0.0);
     assert_eq!(Envelope::<f64>::zero().pendulum().angle(), 0.0);
 }
 
 #[test]
-fn prop_the_four_quadrants_of_s_and_r_are_told_apart() {
+fn the_four_quadrants_of_s_and_r_are_told_apart() {
     for theta_deg in [-80.0, -50.0, -40.0, -10.0, 10.0, 40.0, 50.0, 80.0, 90.0_f64] {
         let orbit = Orbit { a: 1.0, q: 0.0, theta: theta_deg.to_radians(), delta: 0.0 };
         approx::assert_relative_eq!(orbit.envelope().pendulum().angle().to_degrees(), theta_deg, max_relative = 1e-14);
@@ -152,7 +152,7 @@ fn prop_the_four_quadrants_of_s_and_r_are_told_apart() {
 }
 
 #[test]
-fn prop_quadrature_does_not_tilt_the_angle() {
+fn quadrature_does_not_tilt_the_angle() {
     for q in [-0.9, -0.1, 0.0, 0.5] {
         let orbit = Orbit { a: 1.0, q, theta: 0.4, delta: 0.0 };
         approx::assert_relative_eq!(orbit.envelope().pendulum().angle(), 0.4, max_relative = 1e-14);

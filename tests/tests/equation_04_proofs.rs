@@ -1,20 +1,22 @@
 //! Equation 4, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 //!
-//! Angles have a period of 180°, so what is compared is twice the angle.
+//! Angles have a period of 180°, so what is compared is twice the angle. In floating point an angle at ±90° may come out
+//! at either end: the bound of the angle all around is one up to half a turn, and says so by its period. Where R is
+//! positive it is a bound between the numbers themselves.
 
 use cvg_model::{Envelope, Orbit, Pendulum, Real};
-use cvg_prover::{Exact, Formula, Proof, Refusal};
-use cvg_tests::domain::any_vector;
+use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
+use cvg_tests::domain::{any_vector, octave, unit};
 use cvg_tests::for_each_precision;
 use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
 use cvg_tests::tolerances::ANGLE;
 
 /// Any envelope but one of a circle: R² + S² > 0.
-fn any(proof: &mut Proof) -> Envelope<Exact> {
+fn any(proof: &mut Proof) -> Result<Envelope<Exact>, Refusal> {
     let [x_c, x_s, y_c, y_s] = ["x_c", "x_s", "y_c", "y_s"].map(Exact::real);
     let e = Envelope::new(x_c, x_s, y_c, y_s);
-    proof.assume_positive(eccentricity(&e.pendulum()));
-    e
+    proof.assume_positive(eccentricity(&e.pendulum()))?;
+    Ok(e)
 }
 
 /// R² + S²
@@ -72,7 +74,7 @@ fn identity_it_is_the_papers_arctangent_twin() {
 }
 
 fn turning_the_pattern_turns_the_angle(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
-    let (e, turn) = (any(proof), Exact::angle("turn"));
+    let (e, turn) = (any(proof)?, Exact::angle("turn"));
     let (sin, cos) = turn.sin_cos();
     let length = eccentricity(&e.pendulum());
     let expected = twice(&e) + Exact::two() * planted * turn;
@@ -94,7 +96,7 @@ fn identity_turning_the_pattern_turns_the_angle_twin() {
 
 /// For every factor, of which powers of two are some; the planted error mirrors the envelope.
 fn the_angle_does_not_depend_on_the_amplitude(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
-    let (e, factor) = (any(proof), Exact::nonzero("factor"));
+    let (e, factor) = (any(proof)?, Exact::nonzero("factor"));
     let scaled = Envelope::new(factor * e.x_c, factor * e.x_s, factor * planted * e.y_c, factor * planted * e.y_s);
     let length = proof.product(factor * factor, eccentricity(&e.pendulum()));
     proof.same_angle("2 θ_d", twice(&scaled), twice(&e), Exact::one(), length, &[])
@@ -115,7 +117,7 @@ fn identity_the_angle_does_not_depend_on_the_amplitude_twin() {
 
 /// The planted error shifts the phase of Y against that of X.
 fn the_angle_does_not_depend_on_the_phase(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
-    let (e, phase) = (any(proof), Exact::angle("phase"));
+    let (e, phase) = (any(proof)?, Exact::angle("phase"));
     let (sin, cos) = phase.sin_cos();
     let shifted = e * cos + e.quarter_ahead() * sin;
     let shifted = Envelope { y_c: planted * shifted.y_c, ..shifted };
@@ -138,7 +140,7 @@ fn identity_the_angle_does_not_depend_on_the_phase_twin() {
 
 /// The planted error turns X only.
 fn half_a_turn_is_the_same_angle(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
-    let e = any(proof);
+    let e = any(proof)?;
     let opposite = Envelope::new(-e.x_c, -e.x_s, -planted * e.y_c, -planted * e.y_s);
     let length = eccentricity(&e.pendulum());
     proof.same_angle("2 θ_d", twice(&opposite), twice(&e), Exact::one(), length, &[])
@@ -199,6 +201,26 @@ impl Formula for AngleOf {
         let zero = T::zero();
         vec![Pendulum { e: zero, q: zero, r: x[0], s: x[1], l: zero }.angle()]
     }
+
+    fn period_turns(&self) -> f64 {
+        0.5
+    }
+}
+
+/// (R, S) with R > 0, at every scale: one is the largest, and R no less than 2⁻²⁰ of S.
+fn directions_ahead() -> Vec<Inputs> {
+    let small = Interval::new(2.0_f64.powi(-20), 1.0);
+    let sides = [octave(), -octave()].map(|s| vec![small, s]);
+    [vec![octave(), unit()]].into_iter().chain(sides).collect()
+}
+
+/// θ of R > 0 and S, as a number.
+struct AngleAhead;
+
+impl Formula for AngleAhead {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        AngleOf.outputs(x)
+    }
 }
 
 /// θ of an envelope in phase with the reference: Equation 4 of Equation 2.
@@ -208,12 +230,30 @@ impl Formula for AngleOfEnvelope {
     fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
         vec![Envelope::new(x[0], T::zero(), x[1], T::zero()).pendulum().angle()]
     }
+
+    fn period_turns(&self) -> f64 {
+        0.5
+    }
 }
 
 for_each_precision! {
     //= specs/equation-04.md#arctangent-of-the-paper
     //= type=test
     //# The angle MUST equal half the arctangent of S over R where R is positive.
+    #[test]
+    fn interval_the_angle_where_r_is_positive() {
+        bounded::<T>(&AngleAhead, &directions_ahead(), &ANGLE);
+    }
+
+    #[test]
+    fn interval_the_angle_where_r_is_positive_twin() {
+        rejects_rounding::<T>(&AngleAhead, &directions_ahead(), &ANGLE);
+    }
+
+    //= specs/equation-04.md#orientation-of-the-orbit
+    //= type=test
+    //# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+    /// All around, up to half a turn.
     #[test]
     fn interval_the_angle() {
         bounded::<T>(&AngleOf, &directions(), &ANGLE);

@@ -112,7 +112,7 @@ for_each_scalar! {
 //= type=test
 //# The part of the measured energy that the equation neglects MUST be of second order in the semi-minor axis.
 #[test]
-fn prop_a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
+fn a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
     // Equation 6 is for q = 0; the part that it leaves out is of the order of q², not of q.
     let g = DetectionGains { x: 1.0, y: 1.0132 };
     let off = |q: f64| {

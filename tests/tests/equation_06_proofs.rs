@@ -40,7 +40,7 @@ fn the_squared_gains_are_the_extremes(proof: &mut Proof, planted: Exact) -> Resu
         let g = any_gains();
         let (x2, y2) = (g.x * g.x, g.y * g.y);
         let (low, high) = if y_is_larger { (x2, y2) } else { (y2, x2) };
-        proof.assume_positive(high - low);
+        proof.assume_positive(high - low)?;
         let seen = g.measured_energy(e, theta);
         let span = proof.product(e, high - low);
         let (at_low, at_high) = if y_is_larger { (cos, sin) } else { (sin, cos) };

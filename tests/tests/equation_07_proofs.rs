@@ -180,13 +180,20 @@ fn the_error_has_the_sign_of_the_mismatch(proof: &mut Proof, planted: Exact) -> 
     let (x_beyond, y_beyond) = error_point(proof, g, acute + Exact::quarter_turn())?;
     proof.positive_by_factors("within 90°", x)?;
     proof.positive_by_factors("within 90°", x_beyond)?;
+    let (sin, cos) = acute.sin_cos();
     if g == one {
+        // then there is none: of neither sign
+        for (sense, mismatch) in [(one, g - one), (-one, one - g)] {
+            let weight = proof.product(mismatch, sin * cos);
+            let squares = [(Exact::two() * weight, one)];
+            proof.not_negative("no error before 90°", sense * y, one, &squares)?;
+            proof.not_negative("no error after 90°", -sense * y_beyond, one, &squares)?;
+        }
         return Ok(());
     }
     // (g − 1)² > 0 where g ≠ 1
     let (size, sign) = if g < one { (one - g, -one) } else { (g - one, one) };
     let square = proof.product(size, size);
-    let (sin, cos) = acute.sin_cos();
     let gained = proof.product(square, sin * cos);
     proof.positive("before 90°", y * mismatch, one, (one + one) * gained, &[])?;
     proof.positive("after 90°", -y_beyond * mismatch, one, (one + one) * gained, &[])?;
@@ -398,12 +405,16 @@ fn ratios_and_angles() -> Vec<Inputs> {
     vec![vec![any_ratio(), any_angle()]]
 }
 
-/// θ_d
+/// θ_d, up to a whole turn: next to 180° it may come out next to −180°
 struct MeasuredAngle;
 
 impl Formula for MeasuredAngle {
     fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
         vec![measured_angle(x[0], x[1])]
+    }
+
+    fn period_turns(&self) -> f64 {
+        1.0
     }
 }
 

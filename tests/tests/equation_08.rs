@@ -123,7 +123,7 @@ proptest! {
 //# Each force along the orbit MUST move the property of the orbit that is its own: f_as the amplitude, f_qs the orientation, f_qc the quadrature and f_ac the phase, with the signs −, −, + and −.
 /// The signs by which each force moves the orbit, for q ≈ 0.
 #[test]
-fn prop_each_force_moves_its_own_property_of_the_orbit() {
+fn each_force_moves_its_own_property_of_the_orbit() {
     let (two_omega, a, theta) = (2.0, 3.0, 0.7);
     let e = Orbit { a, q: 0.0, theta, delta: 0.0 }.envelope();
     let moved = |v_as: f64, v_qc: f64, offset: f64| {

@@ -4,9 +4,9 @@ use cvg_model::actuation::misaligned_forces;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Orbit, Real};
 use cvg_prover::{Exact, Formula, Proof, Refusal};
-use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::domain::{any_angle, any_vector, octave};
 use cvg_tests::for_each_precision;
-use cvg_tests::proof::{Inputs, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::proof::{Inputs, WRONG, bounded, holds, magnitude, rejects, rejects_rounding};
 use cvg_tests::tolerances::MISALIGNED_FORCES;
 
 /// Any gain, any commands.
@@ -198,22 +198,22 @@ fn identity_each_force_moves_its_own_property_twin() {
 
 // Rounding: bounds for all inputs of a box.
 
-/// Gain and commands at every scale: each force is linear in one command, whose sign it takes on.
+/// Gain and both commands at every scale, either command the larger one, every angle.
 fn gains_commands_and_angles() -> Vec<Inputs> {
-    vec![vec![octave(), octave(), any_angle()]]
+    any_vector(2).into_iter().map(|v| [vec![octave()], v, vec![any_angle()]].concat()).collect()
 }
 
-/// The four forces relative to G_A times the command that makes them.
+/// The four forces relative to G_A times both commands.
 struct MisalignedForces;
 
 impl Formula for MisalignedForces {
     fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
-        let f = misaligned_forces(x[0], &ControlOutputs { v_as: x[1], v_qc: x[1] }, x[2]);
+        let f = misaligned_forces(x[0], &ControlOutputs { v_as: x[1], v_qc: x[2] }, x[3]);
         vec![f.a_s, f.q_s, f.a_c, f.q_c]
     }
 
     fn scale<T: Real>(&self, x: &[T]) -> T {
-        x[0] * x[1]
+        x[0] * (magnitude(x[1]) + magnitude(x[2]))
     }
 }
 

@@ -140,7 +140,7 @@ proptest! {
 }
 
 #[test]
-fn prop_at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
+fn at_0_degrees_the_energy_command_drives_x_and_at_90_degrees_y() {
     let gains = ActuationGains { x: 2.0, y: 3.0 };
     let v = ControlOutputs { v_as: 1.0, v_qc: 0.0 };
     let along_x = gains.axis_forces(&v, 0.0);

@@ -115,7 +115,7 @@ for_each_scalar! {
 //= type=test
 //# The force on the wrong axis MUST be largest at 45°, where it is half the difference of the gains times the command, and zero at every multiple of 90°.
 #[test]
-fn prop_what_leaks_is_largest_at_45_degrees_and_nothing_at_multiples_of_90_degrees() {
+fn what_leaks_is_largest_at_45_degrees_and_nothing_at_multiples_of_90_degrees() {
     let gains = ActuationGains { x: 1.0113, y: 1.0 };
     let leak = |theta: f64| gains.orbit_forces(&ControlOutputs { v_as: 1.0, v_qc: 0.0 }, theta).q_s;
     approx::assert_relative_eq!(leak(FRAC_PI_4), -0.5 * 0.0113, max_relative = 1e-12);

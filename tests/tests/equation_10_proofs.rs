@@ -3,9 +3,9 @@
 use cvg_model::actuation::misaligned_forces;
 use cvg_model::{ActuationGains, ControlOutputs, Real};
 use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
-use cvg_tests::domain::{any_angle, octave};
+use cvg_tests::domain::{any_angle, any_vector, octave};
 use cvg_tests::for_each_precision;
-use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, larger, magnitude, rejects, rejects_rounding};
 use cvg_tests::tolerances::ORBIT_FORCES;
 
 /// Any gains, any commands, any angle.
@@ -186,22 +186,24 @@ fn identity_the_leak_is_largest_at_45_degrees_twin() {
 
 // Rounding: bounds for all inputs of a box.
 
-/// G_Ay and the command at every scale, G_Ax from a tenth to five, every angle.
+/// G_Ay and both commands at every scale, G_Ax from a tenth to five, either command the larger one, every angle.
 fn gains_commands_and_angles() -> Vec<Inputs> {
-    vec![vec![Interval::new(0.1, 5.0), octave(), octave(), any_angle()]]
+    let gains = vec![Interval::new(0.1, 5.0), octave()];
+    any_vector(2).into_iter().map(|v| [gains.clone(), v, vec![any_angle()]].concat()).collect()
 }
 
-/// The four forces relative to the larger gain times the command that makes them.
+/// The four forces relative to the larger gain times both commands.
 struct OrbitForcesOf;
 
 impl Formula for OrbitForcesOf {
     fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
-        let f = ActuationGains { x: x[0], y: x[1] }.orbit_forces(&ControlOutputs { v_as: x[2], v_qc: x[2] }, x[3]);
+        let v = ControlOutputs { v_as: x[2], v_qc: x[3] };
+        let f = ActuationGains { x: x[0], y: x[1] }.orbit_forces(&v, x[4]);
         vec![f.a_s, f.q_s, f.a_c, f.q_c]
     }
 
     fn scale<T: Real>(&self, x: &[T]) -> T {
-        (if x[0] < x[1] { x[1] } else { x[0] }) * x[2]
+        larger(x[0], x[1]) * (magnitude(x[2]) + magnitude(x[3]))
     }
 }
 

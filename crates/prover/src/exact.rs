@@ -11,10 +11,11 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use cvg_model::{Float, Real};
 use num_rational::BigRational;
-use num_traits::ToPrimitive;
+use num_traits::{One, ToPrimitive};
 
 use crate::fraction::Fraction;
-use crate::world::{self, Kind, Orders, World};
+use crate::known::{Debt, Orders};
+use crate::world::{self, Kind, Value, World};
 
 /// A real number of the proof that is running on this thread.
 #[derive(Clone, Copy)]
@@ -27,24 +28,28 @@ pub struct Exact {
 const ANY_RUN: u32 = u32::MAX;
 
 impl Exact {
-    pub(crate) fn keep(value: Fraction) -> Self {
-        world::with(|w| Self { run: w.epoch, index: w.keep(value) })
+    pub(crate) fn keep(value: Fraction, rests: usize) -> Self {
+        world::with(|w| Self { run: w.epoch, index: w.keep(value, rests) })
     }
 
     pub(crate) fn fraction(self) -> Fraction {
+        self.value().fraction
+    }
+
+    pub(crate) fn value(self) -> Value {
         world::with(|w| self.value_in(w))
     }
 
-    pub(crate) fn value_in(self, world: &World) -> Fraction {
+    pub(crate) fn value_in(self, world: &World) -> Value {
         if self.run == ANY_RUN {
-            return Fraction::variable(world::PI);
+            return Value { fraction: Fraction::variable(world::PI), rests: 0 };
         }
         assert_eq!(self.run, world.epoch, "a value of another proof");
         world.value(self.index).clone()
     }
 
     fn declared(name: &str, kind: Kind) -> Self {
-        Self::keep(Fraction::variable(world::with(|w| w.declare(name, kind, None))))
+        Self::keep(Fraction::variable(world::with(|w| w.declare(name, kind, None))), 0)
     }
 
     /// Any real number.
@@ -64,12 +69,12 @@ impl Exact {
 
     /// Any angle.
     pub fn angle(name: &str) -> Self {
-        Self::keep(Fraction::variable(world::with(|w| w.angle(name, false))))
+        Self::keep(Fraction::variable(world::with(|w| w.angle(name, false))), 0)
     }
 
     /// Any angle above 0° and below 90°.
     pub fn acute(name: &str) -> Self {
-        Self::keep(Fraction::variable(world::with(|w| w.angle(name, true))))
+        Self::keep(Fraction::variable(world::with(|w| w.angle(name, true))), 0)
     }
 
     /// 90°
@@ -79,11 +84,12 @@ impl Exact {
 
     /// A point in the direction of this angle, (cos, sin) times a positive number: for an arctangent its own arguments.
     pub fn ray(self) -> (Self, Self) {
-        let (x, y) = world::with(|w| {
+        let (x, y, rests) = world::with(|w| {
             let angle = self.value_in(w);
-            w.direction(&angle, true)
+            let (x, y, rests) = w.direction(&angle.fraction, true);
+            (x, y, rests.max(angle.rests))
         });
-        (Self::keep(x), Self::keep(y))
+        (Self::keep(x, rests), Self::keep(y, rests))
     }
 
     /// The distance of the arguments of an arctangent from the origin, √(x² + y²), above 0 where the arctangent is one.
@@ -91,25 +97,39 @@ impl Exact {
     /// # Panics
     /// Where this is not an arctangent.
     pub fn radius(self) -> Self {
-        let radius = world::with(|w| {
+        let (radius, rests) = world::with(|w| {
             let angle = self.value_in(w);
-            let [(arc, 1)] = w.multiples(&angle)[..] else { panic!("refused: {self:?} is not an arctangent") };
-            w.radius(arc)
+            let [(arc, 1)] = w.multiples(&angle.fraction)[..] else { panic!("refused: {self:?} is not an arctangent") };
+            (w.radius(arc), angle.rests)
         });
-        Self::keep(Fraction::variable(radius))
+        Self::keep(Fraction::variable(radius), rests)
     }
 
-    /// The partial derivative by an indeterminate. Domain: no angle, root or arctangent of it occurs.
+    /// The partial derivative by an indeterminate, through roots, sines, cosines and arctangents of it: of the value as
+    /// it is on this path.
+    ///
+    /// # Panics
+    /// Where `by` is not one real or angle that stands for itself, and where this path has no inside: two values were
+    /// found equal.
+    #[must_use]
     pub fn derivative(self, by: Self) -> Self {
-        let (value, by) = (self.fraction(), by.fraction());
-        let variable = by.numerator.as_monomial().map(|(m, _)| m.powers().to_vec());
-        let Some([(variable, 1)]) = variable.as_deref() else { panic!("refused: a derivative by {by:?}") };
-        let (n, d) = (&value.numerator, &value.denominator);
-        let slope = world::with(|w| {
-            let top = n.derivative(*variable).times(d, w).plus(&n.times(&d.derivative(*variable), w).negated());
-            Fraction::new(&top, &d.times(d, w))
+        let by_value = by.fraction();
+        let variable = by_value.as_polynomial().and_then(|p| p.as_monomial()).and_then(|(monomial, coefficient)| {
+            let [(variable, 1)] = monomial.powers() else { return None };
+            coefficient.is_one().then_some(*variable)
         });
-        Self::keep(slope)
+        let slope = world::with(|w| {
+            let free = |v: &usize| {
+                matches!(w.indeterminates[*v].kind, Kind::Real | Kind::Nonzero | Kind::Positive | Kind::Angle { .. })
+            };
+            let variable = variable.filter(free)?;
+            assert!(!w.is_thin(), "refused: a derivative where two values were found equal");
+            let value = self.value_in(w);
+            let (slope, rests) = w.derivative(&value.fraction, variable);
+            Some((slope, rests.max(value.rests)))
+        });
+        let Some((slope, rests)) = slope else { panic!("refused: a derivative by {by:?}") };
+        Self::keep(slope, rests)
     }
 }
 
@@ -125,8 +145,11 @@ macro_rules! operation {
         impl $trait for Exact {
             type Output = Self;
             fn $method(self, other: Self) -> Self {
-                let value = world::with(|w| self.value_in(w).$of(&other.value_in(w), w));
-                Self::keep(value)
+                let (value, rests) = world::with(|w| {
+                    let (a, b) = (self.value_in(w), other.value_in(w));
+                    (a.fraction.$of(&b.fraction, w), a.rests.max(b.rests))
+                });
+                Self::keep(value, rests)
             }
         }
     };
@@ -139,27 +162,29 @@ operation!(Mul, mul, times);
 impl Div for Exact {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        let value = world::with(|w| {
-            let divisor = other.value_in(w);
-            assert!(!divisor.is_zero(), "refused: a division by zero");
-            w.divisors.push(divisor.numerator.clone());
-            self.value_in(w).over(&divisor, w)
+        let (value, rests) = world::with(|w| {
+            let (value, divisor) = (self.value_in(w), other.value_in(w));
+            assert!(!divisor.fraction.is_zero(), "refused: a division by zero");
+            let owed = w.owe(Debt::Division(divisor.fraction.numerator.clone()));
+            (value.fraction.over(&divisor.fraction, w), owed.max(value.rests).max(divisor.rests))
         });
-        Self::keep(value)
+        Self::keep(value, rests)
     }
 }
 
 impl Neg for Exact {
     type Output = Self;
     fn neg(self) -> Self {
-        Self::keep(self.fraction().negated())
+        let value = self.value();
+        Self::keep(value.fraction.negated(), value.rests)
     }
 }
 
 impl Exact {
     fn decide(self, other: Self, asked: Orders) -> bool {
         world::with(|w| {
-            let difference = self.value_in(w).minus(&other.value_in(w), w);
+            let (a, b) = (self.value_in(w), other.value_in(w));
+            let difference = Value { fraction: a.fraction.minus(&b.fraction, w), rests: a.rests.max(b.rests) };
             w.decide(&difference, asked)
         })
     }
@@ -202,42 +227,43 @@ impl PartialOrd for Exact {
 
 impl Real for Exact {
     fn ratio(numerator: i32, denominator: i32) -> Self {
-        Self::keep(Fraction::constant(BigRational::new(numerator.into(), denominator.into())))
+        Self::keep(Fraction::constant(BigRational::new(numerator.into(), denominator.into())), 0)
     }
 
     fn sqrt(self) -> Self {
-        let value = self.fraction();
-        let Some(radicand) = value.as_polynomial().cloned() else {
+        let value = self.value();
+        let Some(radicand) = value.fraction.as_polynomial().cloned() else {
             panic!("refused: the root of the quotient {self:?}");
         };
-        let root = world::with(|w| {
-            let positive = |p| w.is_positive(&Fraction::whole(p));
-            if let Some(root) = radicand.monomial_root()
-                && positive(root.clone())
+        let (root, rests) = world::with(|w| {
+            if let Some(root) = radicand.monomial_root().map(Fraction::whole)
+                && let Some(rests) = w.positive(&root)
             {
-                return Fraction::whole(root);
+                return (root, rests);
             }
-            w.radicands.push(radicand.clone());
-            Fraction::variable(w.root(&radicand))
+            let owed = w.owe(Debt::Root(radicand.clone()));
+            (Fraction::variable(w.root(&radicand)), owed)
         });
-        Self::keep(root)
+        Self::keep(root, rests.max(value.rests))
     }
 
     fn sin_cos(self) -> (Self, Self) {
-        let (cos, sin) = world::with(|w| {
+        let (cos, sin, rests) = world::with(|w| {
             let angle = self.value_in(w);
-            w.direction(&angle, false)
+            let (cos, sin, rests) = w.direction(&angle.fraction, false);
+            (cos, sin, rests.max(angle.rests))
         });
-        (Self::keep(sin), Self::keep(cos))
+        (Self::keep(sin, rests), Self::keep(cos, rests))
     }
 
     fn atan2(self, x: Self) -> Self {
-        let arc = world::with(|w| {
+        let (arc, rests) = world::with(|w| {
             let (y, x) = (self.value_in(w), x.value_in(w));
             let name = format!("arc{}", w.indeterminates.len());
-            w.declare(&name, Kind::Arc { y, x }, None)
+            let rests = y.rests.max(x.rests);
+            (w.declare(&name, Kind::Arc { y: y.fraction, x: x.fraction }, None), rests)
         });
-        Self::keep(Fraction::variable(arc))
+        Self::keep(Fraction::variable(arc), rests)
     }
 }
 
@@ -246,7 +272,7 @@ impl Float for Exact {
 
     fn from_f64(value: f64) -> Self {
         let Some(value) = BigRational::from_float(value) else { panic!("refused: {value} is not a real number") };
-        Self::keep(Fraction::constant(value))
+        Self::keep(Fraction::constant(value), 0)
     }
 
     fn to_f64(self) -> f64 {

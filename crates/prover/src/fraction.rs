@@ -49,6 +49,11 @@ impl Fraction {
         self.denominator.as_constant().is_some_and(|d| d.is_one()).then_some(&self.numerator)
     }
 
+    /// A product of powers over another one, other than 0.
+    pub(crate) fn is_monomial(&self) -> bool {
+        self.numerator.as_monomial().is_some() && self.denominator.as_monomial().is_some()
+    }
+
     pub(crate) fn as_constant(&self) -> Option<BigRational> {
         self.as_polynomial()?.as_constant()
     }

@@ -11,9 +11,12 @@
 //! a panic where it was asked for arithmetic that it does not have. It never answers approximately.
 #![forbid(unsafe_code)]
 
+mod derivative;
 mod exact;
 mod fraction;
 mod interval;
+mod known;
+mod points;
 mod polynomial;
 mod proof;
 mod rounded;

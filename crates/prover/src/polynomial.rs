@@ -61,6 +61,12 @@ impl Polynomial {
         zero
     }
 
+    pub(crate) fn term(monomial: Monomial, coefficient: BigRational) -> Self {
+        let mut term = Self::default();
+        term.add_term(monomial, coefficient);
+        term
+    }
+
     pub(crate) fn one() -> Self {
         Self::constant(BigRational::one())
     }

@@ -3,19 +3,20 @@
 //! A claim of equality holds if the difference is the zero polynomial. A claim of sign holds if the caller's certificate
 //! does: a positive multiple of the value is a sum of squares with positive weights and, where the sign is strict, of
 //! something known to be positive. Every division and root on the way has to be shown to be allowed before the proof
-//! counts, on every path through comparisons.
+//! counts, on every path through comparisons, by what does not rest on it.
 //!
-//! So that no proof is about nothing, each path is also sampled: a proof needs a point at which all its assumptions
-//! hold, and at each such point every claim is evaluated in floating point. A claim that fails there is refuted, which
-//! is more than unproved.
+//! So that no proof is about nothing, each path is also tried at points: a path needs a point at which all assumptions
+//! hold, unless it is shown that none lies on it; and it needs a claim after its last comparison, unless the argument
+//! says, by [`Proof::outside`], why it claims nothing there. At each point every claim is evaluated in floating point. A
+//! claim that fails there is refuted, which is more than unproved.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-
-use num_traits::Signed;
 
 use crate::Exact;
 use crate::fraction::Fraction;
-use crate::world::{self, Orders, World};
+use crate::known::Debt;
+use crate::world::{self, Value};
 
 /// Why a proof does not hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +39,12 @@ pub enum Refusal {
     Division(String),
     /// a root of something that was not shown to be positive
     Root(String),
-    /// no point obeys the assumptions
-    Vacuous,
+    /// no point was found on this path that obeys the assumptions, and it was not shown that none lies there
+    Vacuous(String),
+    /// nothing is claimed on this path, or nothing after its last comparison
+    Silent(String),
+    /// assumed after a comparison, so that it would narrow this path alone
+    Late(String),
 }
 
 impl fmt::Display for Refusal {
@@ -49,20 +54,28 @@ impl fmt::Display for Refusal {
             Self::Unproved { claim, left } => write!(f, "\"{claim}\" is not shown: {left} is left"),
             Self::Division(by) => write!(f, "a division by {by}, which may be zero"),
             Self::Root(of) => write!(f, "a root of {of}, which may be negative"),
-            Self::Vacuous => f.write_str("no point obeys the assumptions"),
+            Self::Vacuous(path) => write!(f, "no point was found on {path}"),
+            Self::Silent(path) => write!(f, "nothing is claimed at the end of {path}"),
+            Self::Late(assumption) => write!(f, "{assumption} > 0 is assumed after a comparison"),
         }
     }
 }
 
 /// What was proved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Proved {
     /// claims on all paths
     pub claims: usize,
     /// paths through comparisons
     pub paths: usize,
-    /// paths on which a point was found
+    /// paths on which a point was found; on the others none lies, or they are outside or unvisited
     pub covered: usize,
+    /// why nothing is claimed on some paths
+    pub outside: BTreeSet<String>,
+    /// paths on which no point was found, although everything that is claimed was shown there, and why that may be
+    pub unvisited: BTreeMap<String, usize>,
+    /// each claim with the number of paths on which it is made
+    pub by_claim: BTreeMap<String, usize>,
 }
 
 /// How a claim can be evaluated at a point.
@@ -78,10 +91,16 @@ pub type Square = (Exact, Exact);
 /// A proof that is being written: the claims on the path that is walked.
 pub struct Proof {
     claims: Vec<(String, Claim)>,
+    /// comparisons that had been made when the last claim was
+    compared: usize,
+    outside: Option<String>,
+    may_be_empty: Option<String>,
 }
 
-/// Points that are drawn before a path counts as one on which nothing is.
+/// Points that are drawn on each path.
 pub const SAMPLES: u64 = 512;
+/// Points that are drawn before a path counts as one on which nothing is.
+const PATIENCE: u64 = 8 * SAMPLES;
 /// How far a claim may fail in floating point at a point, relative to the sizes involved, before it is refuted.
 const SLACK: f64 = 1e-6;
 /// More paths than this are refused.
@@ -90,25 +109,34 @@ const MOST_PATHS: usize = 20_000;
 /// Runs `argument` along every path through the comparisons that it makes.
 ///
 /// # Errors
-/// The first claim, division or root that is not shown, or that no path has a point.
+/// The first claim, division or root that is not shown, or a path that has no point or claims nothing.
 pub fn prove(argument: impl Fn(&mut Proof) -> Result<(), Refusal>) -> Result<Proved, Refusal> {
     let mut scripts = vec![Vec::new()];
     let mut proved = Proved::default();
     while let Some(script) = scripts.pop() {
         let given = script.len();
         world::begin(script);
-        let mut proof = Proof { claims: Vec::new() };
+        let mut proof = Proof { claims: Vec::new(), compared: 0, outside: None, may_be_empty: None };
         argument(&mut proof)?;
         proved.claims += proof.claims.len();
         proved.paths += 1;
         assert!(proved.paths <= MOST_PATHS, "refused: more than {MOST_PATHS} paths");
-        proved.covered += usize::from(proof.close()?);
+        let found = proof.close()?;
+        proved.covered += usize::from(found);
+        if let Some(reason) = proof.may_be_empty.filter(|_| !found && !world::with(|w| w.is_impossible())) {
+            *proved.unvisited.entry(reason).or_default() += 1;
+        }
+        let names: BTreeSet<&String> = proof.claims.iter().map(|(name, _)| name).collect();
+        for name in names {
+            *proved.by_claim.entry(name.clone()).or_default() += 1;
+        }
+        proved.outside.extend(proof.outside);
         let taken: Vec<bool> = world::with(|w| w.taken.iter().map(|choice| choice.yes).collect());
         for turn in given..taken.len() {
             scripts.push(taken[..turn].iter().copied().chain([!taken[turn]]).collect());
         }
     }
-    if proved.covered == 0 { Err(Refusal::Vacuous) } else { Ok(proved) }
+    if proved.covered == 0 { Err(Refusal::Vacuous("any path".to_owned())) } else { Ok(proved) }
 }
 
 /// The claim and the point that refute a proof.
@@ -138,13 +166,30 @@ impl Proof {
         self.settle(claim, Claim::Equal(a, b), holds, &Fraction::whole(left))
     }
 
-    /// `value` > 0, assumed: a precondition of what is proved.
-    pub fn assume_positive(&mut self, value: Exact) {
-        let value = value.fraction();
+    /// `value` > 0, assumed: a precondition of what is proved, on every path.
+    ///
+    /// # Errors
+    /// Where a comparison was made before: the assumption would hold on one path only.
+    pub fn assume_positive(&mut self, value: Exact) -> Result<(), Refusal> {
+        let value = value.value();
         world::with(|w| {
-            w.facts.push(value.clone());
-            w.assumed.push(value);
-        });
+            if !w.taken.is_empty() {
+                return Err(Refusal::Late(w.text(&value.fraction)));
+            }
+            w.assumed.push(value.fraction.clone());
+            w.learn(value, true);
+            Ok(())
+        })
+    }
+
+    /// Nothing more is claimed on this path, and this is why. It stands in [`Proved::outside`] for all to see.
+    pub fn outside(&mut self, reason: &str) {
+        self.outside = Some(reason.to_owned());
+    }
+
+    /// No point may lie on this path, and this is why that need not be shown. All claims are still to be shown there.
+    pub fn may_be_empty(&mut self, reason: &str) {
+        self.may_be_empty = Some(reason.to_owned());
     }
 
     /// `value` > 0: `multiplier` · `value` = `strict` + Σ weight · square², with `multiplier`, `strict` and the
@@ -169,7 +214,7 @@ impl Proof {
     /// Where a factor may be zero or negative.
     pub fn positive_by_factors(&mut self, claim: &str, value: Exact) -> Result<(), Refusal> {
         let value = value.fraction();
-        let holds = world::with(|w| w.is_positive(&value));
+        let holds = world::with(|w| w.positive(&value).is_some());
         let left = value.clone();
         self.settle(claim, Claim::Positive(value), holds, &left)
     }
@@ -180,23 +225,26 @@ impl Proof {
     /// Where no comparison says so.
     pub fn not_negative_by_path(&mut self, claim: &str, value: Exact) -> Result<(), Refusal> {
         let value = value.fraction();
-        let holds = world::with(|w| w.orders(&value).within(Orders::NOT_LESS));
+        let holds = world::with(|w| w.never_below(&value));
         let left = value.clone();
         self.settle(claim, Claim::NotNegative(value), holds, &left)
     }
 
-    /// The product of two values that are known to be positive, which then is known to be positive.
+    /// The product of two values that are known to be positive, or not to be negative, which then is known to be.
     ///
     /// # Panics
-    /// Where a factor is not known to be positive.
+    /// Where a factor is not known to be either.
     pub fn product(&mut self, a: Exact, b: Exact) -> Exact {
         let product = a * b;
-        for factor in [a, b] {
-            let known = world::with(|w| w.is_positive(&factor.value_in(w)));
-            assert!(known, "refused: {factor:?} is not known to be positive");
-        }
-        let value = product.fraction();
-        world::with(|w| w.facts.push(value));
+        let mut value = product.value();
+        let strict = [a, b].map(|factor| {
+            let of = factor.fraction();
+            let (strictly, weakly) = world::with(|w| (w.positive(&of), w.not_negative(&of)));
+            let Some(rests) = strictly.or(weakly) else { panic!("refused: {factor:?} is not known to be positive") };
+            value.rests = value.rests.max(rests);
+            strictly.is_some()
+        });
+        world::with(|w| w.learn(value, strict == [true, true]));
         product
     }
 
@@ -242,58 +290,70 @@ impl Proof {
         squares: &[Square],
     ) -> Result<(), Refusal> {
         let weighted = squares.iter().map(|(weight, root)| *weight * *root * *root);
-        let sum = strict.into_iter().chain(weighted).reduce(|a, b| a + b).map(Exact::fraction);
-        let (left, known) = world::with(|w| {
-            let product = multiplier_times(multiplier, value, w);
-            let left = sum.map_or(product.clone(), |sum| product.minus(&sum, w));
-            let mut weights = squares.iter().map(|(weight, _)| *weight).chain([multiplier]).chain(strict);
-            (left, weights.all(|weight| w.is_positive(&weight.value_in(w))))
+        let sum = strict.into_iter().chain(weighted).reduce(|a, b| a + b).map(Exact::value);
+        let (value, multiplier) = (value.value(), multiplier.value());
+        let (left, known, rests) = world::with(|w| {
+            let product = multiplier.fraction.times(&value.fraction, w);
+            let left = sum.as_ref().map_or(product.clone(), |sum| product.minus(&sum.fraction, w));
+            let strictly = strict.map(|s| s.value_in(w).fraction).into_iter().chain([multiplier.fraction.clone()]);
+            let signs = strictly.map(|v| w.positive(&v));
+            let weights = squares.iter().map(|(weight, _)| weight.value_in(w).fraction);
+            let signs: Vec<_> = signs.chain(weights.map(|weight| w.not_negative(&weight))).collect();
+            let of_values = [&value, &multiplier].into_iter().chain(&sum).map(|v| v.rests);
+            let rests = of_values.chain(signs.iter().flatten().copied()).max().unwrap_or(0);
+            (left, signs.iter().all(Option::is_some), rests)
         });
-        let value = value.fraction();
         let holds = known && left.is_zero();
-        let evaluated =
-            if strict.is_some() { Claim::Positive(value.clone()) } else { Claim::NotNegative(value.clone()) };
-        self.settle(claim, evaluated, holds, &left)?;
-        if strict.is_some() {
-            world::with(|w| w.facts.push(value));
-        }
+        let fraction = value.fraction;
+        let evaluated = if strict.is_some() { Claim::Positive } else { Claim::NotNegative };
+        self.settle(claim, evaluated(fraction.clone()), holds, &left)?;
+        world::with(|w| w.learn(Value { fraction, rests }, strict.is_some()));
         Ok(())
     }
 
     fn settle(&mut self, claim: &str, evaluated: Claim, holds: bool, left: &Fraction) -> Result<(), Refusal> {
         self.claims.push((claim.to_owned(), evaluated));
-        if holds {
+        self.compared = world::with(|w| w.taken.len());
+        // of no point anything may be said
+        if holds || (self.sampled()? == 0 && world::with(|w| w.is_impossible())) {
             return Ok(());
         }
-        self.sampled()?;
         Err(Refusal::Unproved { claim: claim.to_owned(), left: world::with(|w| w.text(left)) })
     }
 
-    /// Pays the debts of this path; whether a point of it was found.
+    /// Pays the debts of this path, and looks whether it is about something; whether a point of it was found.
     fn close(&self) -> Result<bool, Refusal> {
+        // a claim that is false is told before one that rests on nothing
+        let points = self.sampled()?;
         world::with(|w| {
-            if let Some(divisor) = w.divisors.iter().find(|d| d.as_constant().is_none() && !w.is_nonzero(d)) {
-                return Err(Refusal::Division(w.text(&Fraction::whole(divisor.clone()))));
+            let text = |p: &crate::polynomial::Polynomial| w.text(&Fraction::whole(p.clone()));
+            match w.unpaid() {
+                Some(Debt::Division(by)) => return Err(Refusal::Division(text(by))),
+                Some(Debt::Root(of)) => return Err(Refusal::Root(text(of))),
+                None => {}
             }
-            let allowed = |p: &&crate::polynomial::Polynomial| match p.as_constant() {
-                Some(value) => value.is_negative(),
-                None => !w.is_positive(&Fraction::whole((*p).clone())),
-            };
-            match w.radicands.iter().find(allowed) {
-                Some(radicand) => Err(Refusal::Root(w.text(&Fraction::whole(radicand.clone())))),
-                None => Ok(()),
+            if self.outside.is_some() || (points == 0 && w.is_impossible()) {
+                return Ok(points > 0);
             }
-        })?;
-        Ok(self.sampled()? > 0)
+            let silent = self.claims.is_empty() || self.compared < w.taken.len();
+            match (points, silent) {
+                (_, true) => Err(Refusal::Silent(w.path())),
+                (0, _) if self.may_be_empty.is_none() => Err(Refusal::Vacuous(w.path())),
+                (points, _) => Ok(points > 0),
+            }
+        })
     }
 
     /// Evaluates every claim at points that obey the assumptions and lie on this path; how many there were.
     fn sampled(&self) -> Result<usize, Refusal> {
         world::with(|w| {
             let mut points = 0;
-            for n in 0..SAMPLES {
+            for n in 0..PATIENCE {
+                if n >= SAMPLES && points > 0 {
+                    break;
+                }
                 let at = w.sample(n);
-                if !admissible(w, &at) {
+                if !w.is_on_path(&at) {
                     continue;
                 }
                 points += 1;
@@ -306,20 +366,6 @@ impl Proof {
             Ok(points)
         })
     }
-}
-
-fn multiplier_times(multiplier: Exact, value: Exact, w: &World) -> Fraction {
-    multiplier.value_in(w).times(&value.value_in(w), w)
-}
-
-/// All assumptions hold at this point, it lies on this path, and nothing is divided by zero.
-fn admissible(w: &World, at: &[f64]) -> bool {
-    let value = |f: &Fraction| f.evaluate(|v| at[v]);
-    let on_path = w.taken.iter().all(|choice| choice.orders.hold(value(&choice.difference)));
-    on_path
-        && w.assumed.iter().all(|f| value(f) > 1e-6)
-        && w.divisors.iter().all(|d| d.evaluate(|v| at[v]).abs() > 1e-6)
-        && at.iter().all(|v| v.is_finite())
 }
 
 impl Claim {

@@ -5,9 +5,13 @@
 //! errors of the operands become. Sine, cosine and arctangent are those of `libm`, taken to be within
 //! [`Format::SIN_COS_ULPS`] and [`Format::ATAN2_ULPS`]:
 //! an assumption, to which the real functions are held by a test.
+//!
+//! Where the machine's value can be a turn away from the real one, next to the cut of the arctangent, a value says so in
+//! [`Rounded::turns`]. Sums, signs, halves and doubles keep it; everything else takes it for the error that it is.
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 use std::marker::PhantomData;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -48,8 +52,8 @@ pub struct Rounded<F> {
     pub real: Interval,
     /// how far the machine's value can be from the real one; infinite where nothing is known
     pub error: f64,
-    /// an angle near ±180°, whose two values may be a whole turn apart besides the error
-    pub wraps: bool,
+    /// besides the error the two may be so many turns of 360° apart, forward or back; 0 where they are not
+    pub turns: f64,
     format: PhantomData<F>,
 }
 
@@ -90,13 +94,28 @@ impl<F: Format> Rounded<F> {
         let size = sum(real.magnitude(), error);
         // an overflow, or a NaN of infinities: nothing is known
         let error = if size <= F::LARGEST { error } else { f64::INFINITY };
-        Self { real, error, wraps: false, format: PhantomData }
+        Self { real, error, turns: 0.0, format: PhantomData }
     }
 
     /// The result of an operation that rounds once, after the operands' errors have become `carried`.
     fn once(real: Interval, carried: f64, least: f64) -> Self {
         let size = sum(real.magnitude(), carried);
         Self::made(real, sum(carried, sum(product(F::UNIT, size), least)))
+    }
+
+    /// The same, with turns between the two values.
+    fn turned(self, turns: f64) -> Self {
+        Self { turns, ..self }
+    }
+
+    /// As much as the turns between the two values are.
+    fn reach(self) -> f64 {
+        product(self.turns, TAU.next_up())
+    }
+
+    /// The value with the turns between the two taken for an error.
+    pub(crate) fn settled(self) -> Self {
+        if self.turns == 0.0 { self } else { Self::made(self.real, sum(self.error, self.reach())) }
     }
 
     /// The result of one of `libm`'s functions.
@@ -107,7 +126,7 @@ impl<F: Format> Rounded<F> {
 
     /// The number that this is exactly, in the machine too.
     fn exact(self) -> Option<f64> {
-        (self.error == 0.0 && self.real.lo == self.real.hi && !self.wraps).then_some(self.real.lo)
+        (self.error == 0.0 && self.real.lo == self.real.hi && self.turns == 0.0).then_some(self.real.lo)
     }
 
     fn is_power_of_two(self) -> bool {
@@ -115,7 +134,7 @@ impl<F: Format> Rounded<F> {
     }
 
     fn inexact(self) -> bool {
-        self.error > 0.0 || self.wraps
+        self.error > 0.0 || self.turns > 0.0
     }
 }
 
@@ -131,7 +150,12 @@ impl<F: Format> Add for Rounded<F> {
         if self.exact() == Some(0.0) {
             return o;
         }
-        Self::once(self.real + o.real, sum(self.error, o.error), 0.0)
+        // of two that may be turns away, the turns of one stay turns
+        let o = if self.turns > 0.0 { o.settled() } else { o };
+        let turns = self.turns.max(o.turns);
+        // what is rounded may be as much larger
+        let rounding = product(F::UNIT, product(turns, TAU.next_up()));
+        Self::once(self.real + o.real, sum(self.error, o.error), rounding).turned(turns)
     }
 }
 
@@ -164,6 +188,24 @@ impl<F: Format> Mul for Rounded<F> {
                 return a;
             }
         }
+        if let Some((factor, turned)) = [(self, o), (o, self)].into_iter().find(|(f, t)| f.scales(*t)) {
+            // rounds only where it underflows
+            let size = factor.real.magnitude();
+            let carried = sum(product(size, turned.error), F::TINY);
+            return Self::made(self.real * o.real, carried).turned(size * turned.turns);
+        }
+        let (a, b) = (self.settled(), o.settled());
+        Self::multiplied(a, b)
+    }
+}
+
+impl<F: Format> Rounded<F> {
+    /// A power of two, which keeps the turns of `other` as turns.
+    fn scales(self, other: Self) -> bool {
+        self.is_power_of_two() && other.turns > 0.0
+    }
+
+    fn multiplied(self, o: Self) -> Self {
         let real = self.real * o.real;
         let carried = sum(
             sum(product(self.real.magnitude(), o.error), product(o.real.magnitude(), self.error)),
@@ -183,6 +225,17 @@ impl<F: Format> Div for Rounded<F> {
         if o.exact() == Some(1.0) {
             return self;
         }
+        if o.scales(self) {
+            let size = o.real.magnitude();
+            let carried = sum(quotient(self.error, size), F::TINY);
+            return Self::made(self.real / o.real, carried).turned(self.turns / size);
+        }
+        self.settled().divided(o.settled())
+    }
+}
+
+impl<F: Format> Rounded<F> {
+    fn divided(self, o: Self) -> Self {
         let real = self.real / o.real;
         // x̃/ỹ − x/y = ((x̃ − x) − (x/y)(ỹ − y))/ỹ
         let least = (o.real.mignitude() - o.error).next_down();
@@ -216,7 +269,15 @@ impl<F: Format> Real for Rounded<F> {
         Self::made(real, product(3.1 * F::UNIT, real.magnitude()))
     }
 
+    /// Real numbers have none, the machine has its own: where a branch asks for it, the two may part.
+    fn epsilon() -> Self {
+        Self::made(Interval::point(0.0), F::epsilon().to_f64())
+    }
+
     fn sqrt(self) -> Self {
+        if self.turns > 0.0 {
+            return self.settled().sqrt();
+        }
         let lowest = (self.real.lo - self.error).next_down();
         if self.real.lo < 0.0 || (self.inexact() && lowest < 0.0) {
             return Self::made(self.real.sqrt(), f64::INFINITY);
@@ -228,16 +289,20 @@ impl<F: Format> Real for Rounded<F> {
     }
 
     fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = self.real.sin_cos();
-        // neither moves faster than the angle; a whole turn changes nothing
         if self.exact() == Some(0.0) {
             return (Self::input(Interval::point(0.0)), Self::input(Interval::point(1.0)));
         }
-        (Self::by_library(sin, self.error, F::SIN_COS_ULPS), Self::by_library(cos, self.error, F::SIN_COS_ULPS))
+        // neither moves faster than the angle; a whole turn changes nothing, a part of one does
+        let error = if self.turns.fract() == 0.0 { self.error } else { self.settled().error };
+        // both values lie between −1 and 1
+        let carried = if error.is_finite() { error.min(2.0) } else { error };
+        let (sin, cos) = self.real.sin_cos();
+        (Self::by_library(sin, carried, F::SIN_COS_ULPS), Self::by_library(cos, carried, F::SIN_COS_ULPS))
     }
 
     fn atan2(self, x: Self) -> Self {
-        let (y, (real, cut)) = (self, self.real.atan2(x.real));
+        let (y, x) = (self.settled(), x.settled());
+        let (real, cut) = y.real.atan2(x.real);
         let distance = (x.real.squared() + y.real.squared()).sqrt().lo;
         let reach = (Interval::point(x.error).squared() + Interval::point(y.error).squared()).sqrt().hi;
         let reach = if x.error == 0.0 && y.error == 0.0 { 0.0 } else { reach };
@@ -255,13 +320,25 @@ impl<F: Format> Real for Rounded<F> {
         let carried = quotient(sine, (1.0 - sine * sine).next_down().sqrt().next_down());
         // close to 180° the two may lie on either side of the cut
         let near = x.real.lo <= x.error && y.real.lo <= y.error && y.real.hi >= -y.error && y.inexact();
-        Self { wraps: cut || near, ..Self::by_library(real, carried, F::ATAN2_ULPS) }
+        let turns = if cut || near { 1.0 } else { 0.0 };
+        Self::by_library(real, carried, F::ATAN2_ULPS).turned(turns)
     }
+}
+
+/// Whose comparisons an evaluation follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Follows {
+    /// the machine's and the real numbers' at once: where they may differ, nothing is known
+    #[default]
+    Both,
+    /// the real numbers' alone: only the real values of the results mean something
+    Reals,
 }
 
 /// The path through comparisons of this thread's evaluation.
 #[derive(Default)]
 struct Path {
+    follows: Follows,
     script: Vec<Ordering>,
     taken: Vec<Ordering>,
     undecided: bool,
@@ -273,12 +350,12 @@ thread_local! {
 
 /// Runs `evaluate` once for each outcome of the comparisons that its box leaves open. `None` where rounding leaves a
 /// comparison open, so that machine and real numbers might part there.
-pub(crate) fn on_every_path<R>(mut evaluate: impl FnMut() -> R) -> Option<Vec<R>> {
+pub(crate) fn on_every_path<R>(follows: Follows, mut evaluate: impl FnMut() -> R) -> Option<Vec<R>> {
     let mut scripts = vec![Vec::new()];
     let mut found = Vec::new();
     while let Some(script) = scripts.pop() {
         let given = script.len();
-        PATH.with(|path| *path.borrow_mut() = Path { script, ..Path::default() });
+        PATH.with(|path| *path.borrow_mut() = Path { follows, script, ..Path::default() });
         found.push(evaluate());
         let path = PATH.with(|path| std::mem::take(&mut *path.borrow_mut()));
         if path.undecided {
@@ -301,23 +378,28 @@ impl<F: Format> PartialEq for Rounded<F> {
 
 impl<F: Format> PartialOrd for Rounded<F> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        let lower = |v: &Self| (v.real.lo - v.error).next_down();
-        let upper = |v: &Self| (v.real.hi + v.error).next_up();
-        if upper(self) < lower(other) {
-            return Some(Ordering::Less);
-        }
-        if lower(self) > upper(other) {
-            return Some(Ordering::Greater);
-        }
-        if let (Some(a), Some(b)) = (self.exact(), other.exact()) {
-            return a.partial_cmp(&b);
-        }
-        Some(PATH.with(|path| {
+        PATH.with(|path| {
             let mut path = path.borrow_mut();
-            path.undecided |= self.inexact() || other.inexact();
+            let compared = |v: &Self| match path.follows {
+                Follows::Both => v.settled(),
+                Follows::Reals => Self { error: 0.0, turns: 0.0, ..*v },
+            };
+            let (a, b) = (compared(self), compared(other));
+            let lower = |v: &Self| if v.error == 0.0 { v.real.lo } else { (v.real.lo - v.error).next_down() };
+            let upper = |v: &Self| if v.error == 0.0 { v.real.hi } else { (v.real.hi + v.error).next_up() };
+            if upper(&a) < lower(&b) {
+                return Some(Ordering::Less);
+            }
+            if lower(&a) > upper(&b) {
+                return Some(Ordering::Greater);
+            }
+            if let (Some(a), Some(b)) = (a.exact(), b.exact()) {
+                return a.partial_cmp(&b);
+            }
+            path.undecided |= a.inexact() || b.inexact();
             let order = path.script.get(path.taken.len()).copied().unwrap_or(Ordering::Less);
             path.taken.push(order);
-            order
-        }))
+            Some(order)
+        })
     }
 }

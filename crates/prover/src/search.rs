@@ -8,7 +8,7 @@ use std::fmt;
 
 use cvg_model::Real;
 
-use crate::rounded::on_every_path;
+use crate::rounded::{Follows, on_every_path};
 use crate::{Format, Interval, Rounded};
 
 /// A formula whose rounding is to be bounded: the shipping function, as generic as that is.
@@ -20,6 +20,12 @@ pub trait Formula {
     fn scale<T: Real>(&self, inputs: &[T]) -> T {
         let _ = inputs;
         T::one()
+    }
+
+    /// Results that are this many turns of 360° apart are the same result: ½ for the angle of a pattern, 0 where no two
+    /// are. Without it a bound holds between the numbers themselves.
+    fn period_turns(&self) -> f64 {
+        0.0
     }
 }
 
@@ -46,7 +52,12 @@ pub enum Failure {
         /// as far as this is allowed
         allowed: f64,
     },
-    /// too coarse on this box, or too many boxes
+    /// no box, or no result on this box: nothing is claimed
+    Nothing {
+        /// where
+        at: Vec<Interval>,
+    },
+    /// too coarse on this box, too many boxes, or machine and real numbers may branch apart
     Undecided {
         /// where
         at: Vec<Interval>,
@@ -57,6 +68,7 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Refuted { at, error, allowed } => write!(f, "{error:e} at {at:?}, where {allowed:e} is allowed"),
+            Self::Nothing { at } => write!(f, "nothing is claimed on {at:?}"),
             Self::Undecided { at } => write!(f, "not shown on {at:?}"),
         }
     }
@@ -97,19 +109,24 @@ pub fn bound_rounding<F: Format>(
             }
         }
     }
-    assert!(bounded.points > 0, "refused: no box, no claim");
-    Ok(bounded)
+    if bounded.points == 0 { Err(Failure::Nothing { at: Vec::new() }) } else { Ok(bounded) }
 }
 
 /// The error bound on a box as a share of what is allowed there.
 fn share<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, factor: f64) -> Option<f64> {
     let inputs: Vec<_> = at.iter().map(|i| Rounded::<F>::input(*i)).collect();
-    let shares = on_every_path(|| {
-        let allowed = tolerance * formula.scale(&inputs).real.lo;
-        formula.outputs(&inputs).iter().fold(0.0_f64, |most, output| {
-            let planted = (factor - 1.0).abs() * output.real.magnitude();
-            let error = factor.abs().mul_add(output.error, planted);
-            let share = if allowed > 0.0 { error / allowed } else { f64::INFINITY };
+    let period = formula.period_turns();
+    let shares = on_every_path(Follows::Both, || {
+        let allowed = (tolerance * formula.scale(&inputs).real.lo).next_down();
+        let outputs = formula.outputs(&inputs);
+        // no result is no bound
+        let least = if outputs.is_empty() { f64::INFINITY } else { 0.0 };
+        outputs.iter().fold(least, |most, output| {
+            let same = period > 0.0 && (output.turns / period).fract() == 0.0;
+            let apart = if same { output.error } else { output.settled().error };
+            let planted = ((factor - 1.0).abs() * output.real.magnitude()).next_up();
+            let error = if factor == 1.0 { apart } else { factor.abs().mul_add(apart, planted).next_up() };
+            let share = if allowed > 0.0 { (error / allowed).next_up() } else { f64::INFINITY };
             // NaN counts as unbounded
             if share >= 0.0 { most.max(share) } else { f64::INFINITY }
         })
@@ -117,30 +134,53 @@ fn share<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, fac
     shares.into_iter().reduce(f64::max)
 }
 
-/// Runs the machine in the middle of a box.
+/// Runs the machine in the middle of a box: what it gives has to lie in what the engine encloses, and is refuted where it
+/// is too far from the real value, whichever way each of the two branches.
 fn check_point<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, factor: f64) -> Result<(), Failure> {
     let inputs: Vec<F> = at.iter().map(|i| F::from_f64(i.middle())).collect();
-    let at: Vec<f64> = inputs.iter().map(|v| v.to_f64()).collect();
-    let exact: Vec<_> = at.iter().map(|v| Rounded::<F>::input(Interval::point(*v))).collect();
+    let middle: Vec<f64> = inputs.iter().map(|v| v.to_f64()).collect();
+    if at.iter().zip(&middle).any(|(side, value)| !side.contains(*value)) {
+        return Ok(());
+    }
+    let exact: Vec<_> = middle.iter().map(|v| Rounded::<F>::input(Interval::point(*v))).collect();
     let machine = formula.outputs(&inputs);
-    let Some(enclosed) = on_every_path(|| (formula.outputs(&exact), formula.scale(&exact))) else { return Ok(()) };
-    let [(enclosed, scale)] = &enclosed[..] else { return Ok(()) };
-    for (machine, enclosed) in machine.iter().zip(enclosed) {
-        let value = machine.to_f64();
-        let gap = |value: f64| (enclosed.real.lo - value).max(value - enclosed.real.hi).max(0.0);
-        let turns = if enclosed.wraps { vec![value - TAU, value, value + TAU] } else { vec![value] };
-        let near = turns.iter().map(|v| gap(*v)).fold(f64::INFINITY, f64::min);
-        // 2π is not a number: a turn more or less is only known to this
-        let slack = if enclosed.wraps { 4.0 * F::UNIT } else { 0.0 };
-        let within = near <= enclosed.error.next_up() + slack;
-        assert!(within, "at {at:?} the machine gives {value:e}, the engine encloses {enclosed:?}");
-        let planted = turns.iter().map(|v| gap(factor * v)).fold(f64::INFINITY, f64::min);
+    if machine.is_empty() {
+        return Err(Failure::Nothing { at: at.to_vec() });
+    }
+    let evaluate = || (formula.outputs(&exact), formula.scale(&exact));
+    if let Some([(enclosed, _)]) = on_every_path(Follows::Both, evaluate).as_deref() {
+        assert_eq!(machine.len(), enclosed.len(), "at {middle:?} the engine has other results than the machine");
+        for (machine, enclosed) in machine.iter().zip(enclosed) {
+            let value = machine.to_f64();
+            let within = gap::<F>(value, enclosed.real, enclosed.turns) <= enclosed.error.next_up();
+            assert!(within, "at {middle:?} the machine gives {value:e}, the engine encloses {enclosed:?}");
+        }
+    }
+    let Some(real) = on_every_path(Follows::Reals, evaluate) else { return Ok(()) };
+    let [(real, scale)] = &real[..] else { return Ok(()) };
+    let period = formula.period_turns();
+    for (machine, real) in machine.iter().zip(real) {
+        let error = gap::<F>(factor * machine.to_f64(), real.real, period);
         let allowed = tolerance * scale.real.hi;
-        if planted > allowed + slack {
-            return Err(Failure::Refuted { at, error: planted, allowed });
+        if error > allowed {
+            return Err(Failure::Refuted { at: middle, error, allowed });
         }
     }
     Ok(())
+}
+
+/// How far `value` is from `real` at least, up to `turns` forward or back; infinitely far where it is no number.
+fn gap<F: Format>(value: f64, real: Interval, turns: f64) -> f64 {
+    if value.is_nan() {
+        return f64::INFINITY;
+    }
+    let to = |value: f64| (real.lo - value).max(value - real.hi).max(0.0);
+    if turns == 0.0 {
+        return to(value);
+    }
+    // 2π is not a number: a turn more or less is only known to this
+    let further = [-1.0, 1.0].map(|n| (to(value + n * turns * TAU) - 4.0 * F::UNIT).max(0.0));
+    to(value).min(further[0]).min(further[1])
 }
 
 /// A box cut across the side that is widest for what it was at first; none where no number lies between the ends.

@@ -115,10 +115,10 @@ fn a_claim_of_sign_that_fails_somewhere_is_refuted() {
 fn a_proof_about_nothing_is_refused() {
     let refusal = refused(|proof| {
         let x = Exact::positive("x");
-        proof.assume_positive(-x);
+        proof.assume_positive(-x)?;
         proof.positive_by_factors("x < 0", -x)
     });
-    assert_eq!(refusal, Refusal::Vacuous);
+    assert!(matches!(refusal, Refusal::Vacuous(_)), "{refusal}");
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_comparison_is_remembered_on_its_path() {
         let before = x < y;
         let same = Exact::two() * y > Exact::two() * x;
         assert_eq!(before, same, "2y > 2x is x < y");
-        if before { proof.positive_by_factors("y − x", y - x) } else { Ok(()) }
+        if before { proof.positive_by_factors("y − x", y - x) } else { proof.not_negative_by_path("x − y", x - y) }
     };
     assert_eq!(prove(claim).expect("it holds").paths, 2);
 }
@@ -181,16 +181,4 @@ fn a_sine_of_half_an_angle_is_refused() {
         proof.equal("sin", sin, sin)
     });
     drop(ended);
-}
-
-#[test]
-fn derivatives_follow_the_quotient_rule() {
-    proved(|proof| {
-        let (x, a) = (Exact::real("x"), Exact::positive("a"));
-        let f = x * x * x / (x * x + a);
-        proof.positive("x² + a", x * x + a, Exact::one(), a, &[(Exact::one(), x)])?;
-        let below = proof.product(x * x + a, x * x + a);
-        let slope = (x * x * x * x + Exact::ratio(3, 1) * a * x * x) / below;
-        proof.equal("slope", f.derivative(x), slope)
-    });
 }

@@ -185,8 +185,12 @@ fn assumed(function: &Function, in_file: &[Function]) -> Vec<String> {
     while let Some(f) = reached.get(next).copied() {
         next += 1;
         for call in f.body.split(concat!("proof.", "assume_")).skip(1) {
-            let call = call.lines().next().unwrap_or_default().trim_end_matches(';');
+            let call = call.lines().next().unwrap_or_default().trim_end_matches([';', '?']);
             found.push(format!("{}: {call}", f.name));
+        }
+        for reason in f.body.split(concat!("holds_", "outside(")).skip(1) {
+            let reasons = reason.split_once(']').map_or("", |(list, _)| list).trim_start_matches(['&', '[', '\n', ' ']);
+            found.push(format!("nothing is claimed where: {}", reasons.trim()));
         }
         let words = f.body.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         for called in words.filter_map(|w| in_file.iter().find(|g| g.name == w)) {
@@ -219,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_test_is_called_as_its_surroundings_make_the_runner_call_it() {
-        let text = "fn claim(proof: &mut Proof) {\n    proof.assume_positive(room);\n}\n\n#[test]\nfn identity_x() {\n    \
+        let text = "fn claim(proof: &mut Proof) {\n    proof.assume_positive(room)?;\n}\n\n#[test]\nfn identity_x() {\n    \
             holds(claim);\n}\n\nfor_each_precision! {\n    #[test]\n    fn interval_y() {\n        bounded();\n    }\n}\n\n\
             macro_rules! fault {\n    () => {\n        #[test]\n        fn in_f32() {\n            ends();\n        }\n    };\n}\n\n\
             proptest! {\n    #[test]\n    fn prop_z(x in 0..9) {\n        f(x);\n    }\n}\n";

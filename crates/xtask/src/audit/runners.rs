@@ -15,7 +15,7 @@ use crate::{prove, source};
 pub(crate) type Tests = BTreeMap<String, BTreeMap<String, Status>>;
 
 /// The engines' own tests: what they refuse, and what they assume of `libm`.
-pub(crate) const ENGINES: [&str; 2] = ["exact", "rounding"];
+pub(crate) const ENGINES: [&str; 4] = ["exact", "exact_refusals", "rounding", "rounding_refusals"];
 
 /// Runs the test files `files` and the engines' own tests, as far as `only` lets them.
 pub(crate) fn tests(repository: &Path, files: &[String], only: Option<&str>) -> Result<Tests, String> {
