@@ -241,6 +241,26 @@ fn the_audit_states_the_boxes_and_the_assumptions_as_they_are() {
 }
 
 #[test]
+fn duvet_reads_every_file_of_requirements() {
+    let configuration = read(".duvet/config.toml");
+    for file in files("specs", "md") {
+        let name = file.file_name().expect("a file").to_string_lossy().into_owned();
+        let listed = configuration.contains(&format!("source = \"specs/{name}\""));
+        assert_eq!(listed, name != "README.md", "{name} in .duvet/config.toml");
+    }
+}
+
+/// The prefix says that cases are drawn at random: then the test has something to draw.
+#[test]
+fn a_test_of_random_cases_draws_them() {
+    for file in test_sources() {
+        let text = fs::read_to_string(&file).expect("readable");
+        let fixed = text.lines().find(|line| line.trim_start().starts_with("fn prop_") && line.ends_with("() {"));
+        assert!(fixed.is_none(), "{}: {fixed:?}", file.display());
+    }
+}
+
+#[test]
 fn every_chapter_is_in_the_summary() {
     let summary = read("docs/src/SUMMARY.md");
     for file in files("docs/src", "md") {

@@ -99,7 +99,7 @@ pub(crate) fn functions(file: &Path, text: &str) -> Vec<Function> {
 }
 
 /// `function` and what it calls, as far as it is among `known`.
-fn reached<'a>(function: &'a Function, known: &'a [Function]) -> Vec<&'a Function> {
+pub(crate) fn reached<'a>(function: &'a Function, known: &'a [Function]) -> Vec<&'a Function> {
     let mut seen = BTreeSet::from([function.name.as_str()]);
     let mut found = vec![function];
     let mut next = 0;

@@ -103,6 +103,7 @@ fn supervisor_is_total<T: Float + Arbitrary>(kept: impl Fn(&Observation<T>) -> b
         assert!(state.fault.is_some() && orders == Orders::Rest);
     }
     if state.wish == Wish::Off || !kept(&o) {
+        kani::cover!(state.mode != Mode::Fault, "at rest without a fault");
         assert!(orders == Orders::Rest);
     }
 }

@@ -30,8 +30,10 @@ fn reading_is_within_its_period<T: Float + Arbitrary>(share: T) {
     kani::cover!(reading.status == Status::Invalid, "no number");
     assert!(reading.within_rad.magnitude() <= share * half);
     if reading.status != Status::Valid {
+        kani::cover!(before.periods > 0, "held after turns");
         assert!(state.periods == before.periods && reading.periods == before.periods);
         if before.within_rad.magnitude() <= half {
+            kani::cover!(before.within_rad > T::zero(), "held");
             assert!(reading.within_rad == before.within_rad);
         }
     }

@@ -26,6 +26,7 @@ fn correction_is_within_its_limit<T: Float + Arbitrary>(share: T) {
     assert!(correction.rad_s.magnitude() <= share * limit);
     assert!(state.detuning_rad_s.magnitude() <= share * limit);
     if correction.status != Status::Valid && before.magnitude() <= limit {
+        kani::cover!(before > T::zero(), "held");
         assert!(state.detuning_rad_s == before);
     }
 }
@@ -55,6 +56,7 @@ fn phasor_is_bounded<T: Float + Arbitrary>(longest: T) {
     let unit = || kani::any_where(|v: &T| v.magnitude() <= T::one());
     // precondition: what `new` accepts, for converters of 1 kHz to 1 GHz and corrections up to a sixteenth of the rate
     let period_s = kani::any_where(|p: &T| *p > T::zero() && *p <= T::ratio(1, 1024));
+    // precondition: the same
     let limit_rad_s = kani::any_where(|l: &T| *l > T::zero() && *l <= T::ratio(128, 1));
     let oscillator = Oscillator { centre_cos: unit(), centre_sin: unit(), period_s, limit_rad_s };
     let before = Phasor { cos: kani::any(), sin: kani::any(), step_cos: kani::any(), step_sin: kani::any() };

@@ -17,8 +17,9 @@ fn any_outputs<T: Float + Arbitrary>() -> ControlOutputs<T> {
 
 fn misaligned_forces_are_bounded<T: Float + Arbitrary>(share: T) {
     let v = any_outputs::<T>();
-    // precondition: a gain of any size that electronics have, a finite angle
+    // precondition: a gain of any size that electronics have
     let gain: T = sized(0.0, LARGEST_GAIN);
+    // precondition: a finite angle
     let theta_error: T = kani::any_where(|theta: &T| theta.is_finite());
     let f = misaligned_forces(gain, &v, theta_error);
     let most = share * T::from_f64(LARGEST_COMMAND * LARGEST_GAIN);
@@ -51,8 +52,9 @@ pub fn twin_misaligned_forces_are_bounded_f32() {
 
 fn axis_forces_are_bounded<T: Float + Arbitrary>(share: T) {
     let v = any_outputs::<T>();
-    // precondition: gains of any size that electronics have, a finite angle
+    // precondition: gains of any size that electronics have
     let gains: ActuationGains<T> = ActuationGains { x: sized(0.0, LARGEST_GAIN), y: sized(0.0, LARGEST_GAIN) };
+    // precondition: a finite angle
     let theta: T = kani::any_where(|theta: &T| theta.is_finite());
     let f = gains.axis_forces(&v, theta);
     let most = share * T::from_f64(LARGEST_COMMAND * LARGEST_GAIN);
@@ -61,6 +63,7 @@ fn axis_forces_are_bounded<T: Float + Arbitrary>(share: T) {
         assert!(force >= -most && force <= most);
     }
     if theta == T::zero() {
+        kani::cover!(f.x_s > T::one(), "along X");
         assert!(f.x_s == gains.x * v.v_as && f.y_c == gains.y * v.v_qc && f.y_s == T::zero() && f.x_c == T::zero());
     }
 }
@@ -126,8 +129,9 @@ pub fn twin_half_a_turn_reverses_f64() {
 
 fn equal_gains_do_not_leak<T: Float + Arbitrary>(factor: T) {
     let v = any_outputs::<T>();
-    // precondition: a gain of any size that electronics have, an angle whose double is finite
+    // precondition: a gain of any size that electronics have
     let x: T = sized(0.0, 1e6);
+    // precondition: an angle whose double is finite
     let theta: T = sized(0.0, 1e30);
     let f = ActuationGains { x, y: factor * x }.orbit_forces(&v, theta);
     kani::cover!(theta > T::one(), "any angle");
@@ -156,6 +160,7 @@ fn leak_is_bounded<T: Float + Arbitrary>(share: T) {
     let v = any_outputs::<T>();
     // precondition: gains of any size that electronics have
     let gains: ActuationGains<T> = ActuationGains { x: sized(0.0, 1e6), y: sized(0.0, 1e6) };
+    // budget: angles of so many turns
     let f = gains.orbit_forces(&v, sized(0.0, 1e6));
     let half = T::half() * (gains.y - gains.x);
     kani::cover!(f.q_s > T::one() && f.a_c < T::zero(), "a leak");

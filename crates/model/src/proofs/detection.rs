@@ -10,11 +10,12 @@ use super::{is_nan, sized};
 const GAIN: (f64, f64) = (1e-6, 1e6);
 
 fn quadrature_keeps_zero_and_sign<T: Float + Arbitrary>(one_sign: bool) {
-    // precondition: gains of one sign, of any size that electronics have
+    // precondition: gains of any size that electronics have
     let gains: DetectionGains<T> = DetectionGains { x: sized(GAIN.0, GAIN.1), y: sized(GAIN.0, GAIN.1) };
+    // precondition: gains of one sign
     kani::assume((gains.x > T::zero()) == (gains.y > T::zero()) || !one_sign);
-    // precondition: no underflow
     let q: T = kani::any();
+    // precondition: no underflow
     kani::assume(q == T::zero() || (q.magnitude() > T::from_f64(1e-20) && q.magnitude() < T::from_f64(1e20)));
     let q_d = gains.measured_quadrature(q);
     kani::cover!(q == T::zero(), "no quadrature");
@@ -115,6 +116,7 @@ fn measured_energy_is_not_negative<T: Float + Arbitrary>(least: T) {
     let gains: DetectionGains<T> = DetectionGains { x: sized(GAIN.0, GAIN.1), y: sized(GAIN.0, GAIN.1) };
     // budget: an energy whose products do not overflow
     let e: T = kani::any_where(|e| *e >= T::zero() && *e <= T::from_f64(1e6));
+    // budget: angles of so many turns
     let e_d = gains.measured_energy(e, sized(0.0, 1e6));
     kani::cover!(e_d > T::one(), "energy");
     kani::cover!(e_d == T::zero() && e > T::zero(), "hidden by rounding");
@@ -178,11 +180,13 @@ pub fn twin_angles_are_total_f64() {
 fn error_has_no_branch_cut<T: Float + Arbitrary>(most: T) {
     // precondition: g > 0, of any size that electronics have
     let g: T = kani::any_where(|g| *g >= T::from_f64(GAIN.0) && *g <= T::from_f64(GAIN.1));
+    // budget: angles of so many turns
     let error = angle_error(g, sized(0.0, 1e6));
     kani::cover!(error > T::one() && g > T::one(), "beyond 57°");
     kani::cover!(g < T::one(), "Y is weaker");
     assert!(error.magnitude() <= most);
     if g == T::one() {
+        kani::cover!(true, "equal gains");
         assert!(error == T::zero());
     }
     let bound = angle_error_bound(g);

@@ -18,6 +18,7 @@ fn energy_bounds_the_orientation<T: Float + Arbitrary>(share: T) {
     let no_number = is_nan(e.x_c) || is_nan(e.x_s) || is_nan(e.y_c) || is_nan(e.y_s);
     assert!(p.e >= T::zero() || (is_nan(p.e) && no_number));
     if !is_nan(p.r) {
+        kani::cover!(p.r > T::zero(), "a vibration along X");
         assert!(p.r.magnitude() <= share * p.e);
     }
 }
@@ -74,6 +75,7 @@ fn angle_is_in_range<T: Float + Arbitrary>(half_turn: T, positive: impl Fn(T) ->
     assert!(angle.magnitude() <= half_turn || (is_nan(angle) && (is_nan(r) || is_nan(s))));
     // R of a circle is a difference of equal numbers: +0
     if r == T::zero() && s == T::zero() && positive(r) {
+        kani::cover!(true, "a circle");
         assert!(angle == T::zero());
     }
 }

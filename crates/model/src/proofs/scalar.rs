@@ -10,11 +10,14 @@ fn bound_holds<T: Float + Arbitrary>(share: T) {
     kani::cover!(bounded == value && value < T::zero(), "left as it was");
     kani::cover!(super::is_nan(value) && limit > T::zero(), "no number");
     if limit >= T::zero() {
+        kani::cover!(true, "a limit");
         assert!(bounded >= -(share * limit) && bounded <= share * limit);
     } else {
+        kani::cover!(true, "no limit");
         assert!(bounded == T::zero());
     }
     if value >= -limit && value <= limit {
+        kani::cover!(true, "within the limit");
         assert!(bounded == value);
     }
 }

@@ -166,7 +166,7 @@ fn tests(file: &str, text: &str) -> Vec<Test> {
                 None | Some("proptest! {") => Names::Exactly(vec![name.clone()]),
                 Some(_) => Names::Ending(name.clone()),
             };
-            Test { file: file.to_owned(), names, function: f.clone(), assumptions: assumed(f, &functions) }
+            Test { file: file.to_owned(), names, function: f.clone(), assumptions: assumed(f, &functions, text) }
         })
         .collect()
 }
@@ -180,7 +180,7 @@ fn surrounding(text: &str, line: usize) -> Option<&str> {
 }
 
 /// What `function` and those that it calls in its file tell a proof to assume.
-fn assumed(function: &Function, in_file: &[Function]) -> Vec<String> {
+fn assumed(function: &Function, in_file: &[Function], text: &str) -> Vec<String> {
     let (mut reached, mut next, mut found) = (vec![function], 0, Vec::new());
     while let Some(f) = reached.get(next).copied() {
         next += 1;
@@ -190,7 +190,10 @@ fn assumed(function: &Function, in_file: &[Function]) -> Vec<String> {
         }
         for reason in f.body.split(concat!("holds_", "outside(")).skip(1) {
             let reasons = reason.split_once(']').map_or("", |(list, _)| list).trim_start_matches(['&', '[', '\n', ' ']);
-            found.push(format!("nothing is claimed where: {}", reasons.trim()));
+            // a constant of the file stands for its text
+            let named = text.split_once(&format!("const {}: &str = \"", reasons.trim()));
+            let told = named.and_then(|(_, rest)| rest.split_once('"')).map_or(reasons.trim(), |(told, _)| told);
+            found.push(format!("nothing is claimed where {told}"));
         }
         let words = f.body.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         for called in words.filter_map(|w| in_file.iter().find(|g| g.name == w)) {
@@ -239,5 +242,8 @@ mod tests {
         assert_eq!(names, expected);
         assert_eq!(found[0].assumptions, ["claim: positive(room)"]);
         assert!(found[1].assumptions.is_empty());
+        let left_out = "const LIMITED: &str = \"a drive is at its limit\";\n\n#[test]\nfn identity_x() {\n    \
+            holds_outside(&[LIMITED], claim);\n}\n";
+        assert_eq!(tests("a", left_out)[0].assumptions, ["nothing is claimed where a drive is at its limit"]);
     }
 }

@@ -20,6 +20,8 @@ pub(crate) const SOLVER: &str = "bitwuzla";
 pub(crate) const SOLVERS: [&str; 2] = ["bitwuzla", "minisat"];
 /// KiB of address space for one solver.
 const MEMORY_KIB: u64 = 6_000_000;
+/// By the clock a harness may take so many times as long as on the processor: a machine that is busy changes no answer.
+const PATIENCE: u32 = 20;
 
 /// What a harness asks of the engine.
 #[derive(Clone, Debug)]
@@ -30,7 +32,8 @@ pub(crate) struct Query<'a> {
     pub(crate) unwind: &'a str,
     /// `bitwuzla`, or `minisat`, which is CBMC's own
     pub(crate) solver: &'a str,
-    pub(crate) timeout: Duration,
+    /// on the processor
+    pub(crate) limit: Duration,
 }
 
 /// The verdict on one property.
@@ -44,6 +47,7 @@ pub(crate) struct Property {
 #[derive(Clone, Debug)]
 pub(crate) struct Answer {
     pub(crate) properties: Result<Vec<Property>, String>,
+    /// on the processor
     pub(crate) seconds: f64,
 }
 
@@ -105,12 +109,23 @@ fn fingerprint(text: &str) -> u32 {
 
 /// Asks CBMC about the harness in the C of `folder`.
 pub(crate) fn ask(root: &Root, folder: &Path, query: &Query) -> Answer {
-    let started = Instant::now();
-    let properties = answer(root, folder, query);
-    Answer { properties, seconds: started.elapsed().as_secs_f64() }
+    let times = folder.join(format!("{}.{}.times", query.name, query.solver));
+    let _ = std::fs::remove_file(&times);
+    let properties = answer(root, folder, query, &times);
+    let seconds = std::fs::read_to_string(&times).map_or(0.0, |text| processor_seconds(&text));
+    Answer { properties, seconds }
 }
 
-fn answer(root: &Root, folder: &Path, query: &Query) -> Result<Vec<Property>, String> {
+/// The seconds that a shell's `times` says its children took: the second line, user and system.
+fn processor_seconds(times: &str) -> f64 {
+    let one = |time: &str| -> Option<f64> {
+        let (minutes, seconds) = time.trim_end_matches('s').split_once('m')?;
+        Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
+    };
+    times.lines().nth(1).map_or(0.0, |line| line.split_whitespace().filter_map(one).sum())
+}
+
+fn answer(root: &Root, folder: &Path, query: &Query, times: &Path) -> Result<Vec<Property>, String> {
     let cases: Vec<_> = query
         .covers
         .iter()
@@ -120,8 +135,9 @@ fn answer(root: &Root, folder: &Path, query: &Query) -> Result<Vec<Property>, St
     let file = File::create(&log).map_err(|e| e.to_string())?;
     let mut command = Command::new("sh");
     command
-        // a solver that asks for more than its share ends with an error instead of the machine
-        .args(["-c", &format!("ulimit -v {MEMORY_KIB}; exec \"$0\" \"$@\"")])
+        // a solver that asks for more than its share, of memory or of the processor, ends with an error
+        .args(["-c", &limited(query.limit.as_secs())])
+        .env("TIMES", times)
         .arg(root.tool("cbmc"))
         .args(["host.c", "--no-standard-checks", "--unwinding-assertions", "--unwind", query.unwind])
         .args(["--object-bits", "12", "--slice-formula"])
@@ -145,9 +161,14 @@ fn answer(root: &Root, folder: &Path, query: &Query) -> Result<Vec<Property>, St
         "minisat" => {}
         other => return Err(format!("there is no solver {other}")),
     }
-    let code = wait(&mut command, query.timeout)?;
+    let code = wait(&mut command, query.limit * PATIENCE)?;
     let text = std::fs::read_to_string(&log).map_err(|e| e.to_string())?;
     parse(&text, code)
+}
+
+/// Runs the command in the arguments within its share, and writes the times that it took to `$TIMES`.
+fn limited(seconds: u64) -> String {
+    format!("ulimit -v {MEMORY_KIB}; ulimit -t {seconds}; \"$0\" \"$@\"; code=$?; times >\"$TIMES\"; exit $code")
 }
 
 /// The exit code, or why there is none.
@@ -163,7 +184,7 @@ fn wait(command: &mut Command, timeout: Duration) -> Result<i32, String> {
         if started.elapsed() > timeout {
             let _ = Command::new("kill").args(["-9", "--"]).arg(format!("-{}", child.id())).status();
             let _ = child.wait();
-            return Err(format!("no answer within {} s", timeout.as_secs()));
+            return Err(format!("no answer within {} s by the clock", timeout.as_secs()));
         }
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -300,6 +321,27 @@ mod tests {
         assert_eq!(wait(Command::new("sh").args(["-c", "exit 6"]), Duration::from_secs(10)), Ok(6));
         assert!(wait(Command::new("sh").args(["-c", "kill -9 $$"]), Duration::from_secs(10)).is_err());
         assert!(wait(Command::new("sleep").arg("60"), Duration::from_millis(50)).is_err());
+    }
+
+    #[test]
+    fn a_tool_has_its_time_on_the_processor_and_not_by_the_clock() {
+        let folder = std::env::temp_dir().join(format!("cvg-xtask-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let times = folder.join("times");
+        let run = |limit: u64, script: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", &limited(limit), "sh", "-c", script]).env("TIMES", &times);
+            wait(&mut command, Duration::from_secs(60))
+                .map(|code| (code, processor_seconds(&std::fs::read_to_string(&times).expect("times were written"))))
+        };
+        let busy = "i=0; while [ $i -lt 100000000 ]; do i=$((i+1)); done";
+        let (code, seconds) = run(1, busy).expect("it ends");
+        assert!(code != 0 && code != 10 && seconds > 0.5, "{code}: {seconds} s");
+        // waiting costs nothing
+        let (code, seconds) = run(1, "sleep 1.5; exit 10").expect("it ends");
+        assert!(code == 10 && seconds < 0.5, "{code}: {seconds} s");
+        std::fs::remove_dir_all(&folder).expect("a folder");
+        assert!((processor_seconds("0m0.01s 0m0.02s\n1m2.5s 0m0.25s\n") - 62.75).abs() < 1e-9);
     }
 
     #[test]

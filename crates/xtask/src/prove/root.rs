@@ -1,4 +1,4 @@
-//! The tools of the proofs in a folder of their own: Debian's packages of the day, unpacked, not installed.
+//! The tools of the proofs in a folder of their own: Debian's packages in pinned versions, unpacked, not installed.
 //!
 //! Nothing of it runs as root and nothing outside the folder changes: `apt-get` resolves and checks signatures with a
 //! configuration of its own, `dpkg-deb` unpacks, and each tool is started through the folder's own loader.
@@ -7,10 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const PACKAGES: [&str; 6] = ["cbmc", "bitwuzla", "wabt", "rustc", "libstd-rust-dev-wasm32", "lld"];
+use super::pins;
+
 const TOOLS: [&str; 5] = ["cbmc", "bitwuzla", "wasm2c", "rustc", "wasm-ld"];
-/// Changes when the recipe does: an older folder is made anew.
-const RECIPE: &str = "2";
+/// Changes when the recipe does; each recipe has a folder of its own.
+const RECIPE: &str = "3";
 
 /// The tools, ready to run.
 #[derive(Clone, Debug)]
@@ -43,21 +44,29 @@ impl Root {
     /// The folder at `CVG_PROVE_ROOT`, or in the user's cache; made where it is not there.
     pub(crate) fn ready() -> Result<Self, String> {
         let folder = place()?;
-        if fs::read_to_string(folder.join("recipe")).is_ok_and(|r| r == RECIPE) {
-            return Ok(Self { folder });
+        let root = Self { folder };
+        if fs::read_to_string(root.folder.join("recipe")).is_ok_and(|r| r == RECIPE) && root.is_pinned().is_ok() {
+            return Ok(root);
         }
-        println!("setting up the proof tools in {} (once; some 1.3 GB)", folder.display());
-        set_up(&folder)?;
-        fs::write(folder.join("recipe"), RECIPE).map_err(|e| e.to_string())?;
-        Ok(Self { folder })
+        println!("setting up the proof tools in {} (once; some 1.3 GB)", root.folder.display());
+        set_up(&root.folder)?;
+        root.is_pinned()?;
+        fs::write(root.folder.join("recipe"), RECIPE).map_err(|e| e.to_string())?;
+        Ok(root)
+    }
+
+    /// The tools are those that are pinned.
+    fn is_pinned(&self) -> Result<(), String> {
+        let missing = pins::missing(&self.packages());
+        if missing.is_empty() { Ok(()) } else { Err(format!("other tools than those that are pinned: no {missing:?}")) }
     }
 }
 
 fn place() -> Result<PathBuf, String> {
     let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     from("CVG_PROVE_ROOT")
-        .or_else(|| from("XDG_CACHE_HOME").map(|p| p.join("cvg/prove")))
-        .or_else(|| from("HOME").map(|p| p.join(".cache/cvg/prove")))
+        .or_else(|| from("XDG_CACHE_HOME").map(|p| p.join(format!("cvg/prove-{RECIPE}"))))
+        .or_else(|| from("HOME").map(|p| p.join(format!(".cache/cvg/prove-{RECIPE}"))))
         .ok_or_else(|| "no place for the proof tools: set CVG_PROVE_ROOT".to_owned())
 }
 
@@ -108,10 +117,29 @@ fn set_up(folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Downloads and unpacks the packages and what they depend on; the names of their archives.
+/// Downloads and unpacks the packages and what they depend on; the names of their archives. From the mirror, and where
+/// that has other versions by now, from Debian's archive of snapshots.
 fn unpack(folder: &Path) -> Result<Vec<String>, String> {
     let io = |e: std::io::Error| e.to_string();
     let mirror = std::env::var("CVG_PROVE_MIRROR").unwrap_or_else(|_| "http://deb.debian.org/debian".to_owned());
+    let snapshot = format!("http://snapshot.debian.org/archive/debian/{}", pins::DAY);
+    download(folder, &mirror)
+        .or_else(|now| download(folder, &snapshot).map_err(|then| format!("{mirror}: {now}\n{snapshot}: {then}")))?;
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder.join("apt/cache/archives")).map_err(io)?.flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|e| e == "deb") {
+            checked(Command::new("dpkg-deb").arg("-x").arg(&path).arg(folder))?;
+            names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// The archives of the pinned packages and of what they depend on, in `apt`'s cache.
+fn download(folder: &Path, mirror: &str) -> Result<(), String> {
+    let io = |e: std::io::Error| e.to_string();
     let keys = "/usr/share/keyrings/debian-archive-keyring.gpg";
     if !Path::new(keys).exists() {
         return Err(format!("{keys} is missing (package debian-archive-keyring)"));
@@ -136,15 +164,5 @@ fn unpack(folder: &Path) -> Result<Vec<String>, String> {
         command
     };
     checked(get().arg("update"))?;
-    checked(get().args(["install", "-y", "--download-only"]).args(PACKAGES))?;
-    let mut names = Vec::new();
-    for entry in fs::read_dir(apt.join("cache/archives")).map_err(io)?.flatten() {
-        let path = entry.path();
-        if path.extension().is_some_and(|e| e == "deb") {
-            checked(Command::new("dpkg-deb").arg("-x").arg(&path).arg(folder))?;
-            names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
-        }
-    }
-    names.sort();
-    Ok(names)
+    checked(get().args(["install", "-y", "--download-only"]).args(pins::requests()))
 }
