@@ -15,7 +15,9 @@ use cvg_tests::domain::wrapped;
 /// What the paper's device is set to.
 const DETECTION_RATIO: f64 = 1.0132;
 const ACTUATION_RATIO: f64 = 1.0113;
+/// "On the order of 4.7 mHz", read as 1/s and without 2π: only so it makes the 10 mdeg that the paper states.
 const ANISODAMPING_PER_S: f64 = 4.7e-3;
+/// Ours: the paper gives no number for the nonlinearity of its readout. It makes what is left after the declared model.
 const KAPPA_PER_V2: f64 = 0.004;
 
 fn paper() -> Identification {
@@ -50,16 +52,30 @@ fn paper_the_anisodamping_is_found() {
     assert!((value - ANISODAMPING_PER_S).abs() <= 1e-4, "{value}");
 }
 
+/// What the paper compares: the bias as it is measured, and as its own two mismatches leave it. That it is nine times and
+/// 0.05° here, where the paper has ten times and 0.06°, is the doing of our κ.
 #[test]
-fn paper_the_bias_is_reduced_ten_times_and_its_rest_is_below_60_mdeg() {
+fn paper_the_declared_model_reduces_the_bias_nine_times_where_the_paper_says_ten() {
     let h = paper().report.heldout;
     let raw = h.raw.unwrap();
     println!(
         "rms {:.5}° → {:.5}° → {:.5}°, declared peak {:.4}°",
         raw.rms_deg, h.declared.rms_deg, h.discovered.rms_deg, h.declared.peak_deg
     );
-    assert!(raw.rms_deg >= 10.0 * h.discovered.rms_deg, "{raw:?} to {:?}", h.discovered);
-    assert!(h.declared.peak_deg <= 0.06, "{:?}", h.declared);
+    let reduced = raw.rms_deg / h.declared.rms_deg;
+    assert!((8.5..10.5).contains(&reduced), "{reduced} times: {raw:?} to {:?}", h.declared);
+    assert!((0.03..=0.06).contains(&h.declared.peak_deg), "{:?}", h.declared);
+    // and with the cubic readout, of which the paper says nothing, far beyond that
+    assert!(raw.rms_deg >= 200.0 * h.discovered.rms_deg, "{raw:?} to {:?}", h.discovered);
+}
+
+/// Δ(1/τ)/(4kΩ) at 500 deg/s: 10 mdeg for 4.7e-3 1/s; for 2π · 4.7e-3 1/s it would be 62 mdeg.
+#[test]
+fn paper_the_anisodamping_in_mhz_is_a_rate_without_two_pi() {
+    let k = Scenario::paper().settings().angular_gain;
+    let mdeg = |per_s: f64| 1e3 * (per_s / (4.0 * k * 500_f64.to_radians())).to_degrees();
+    assert!((9.0..11.0).contains(&mdeg(ANISODAMPING_PER_S)), "{}", mdeg(ANISODAMPING_PER_S));
+    assert!((61.0..63.0).contains(&mdeg(TAU * ANISODAMPING_PER_S)), "{}", mdeg(TAU * ANISODAMPING_PER_S));
 }
 
 #[test]

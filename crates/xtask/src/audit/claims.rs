@@ -188,6 +188,10 @@ fn assumed(function: &Function, in_file: &[Function], text: &str) -> Vec<String>
             let call = call.lines().next().unwrap_or_default().trim_end_matches([';', '?']);
             found.push(format!("{}: {call}", f.name));
         }
+        for reason in f.body.split(concat!("proof.may_be", "_empty(\"")).skip(1) {
+            let reason = reason.split_once('"').map_or("", |(told, _)| told);
+            found.push(format!("paths without a point are not shown to be empty: {reason}"));
+        }
         for reason in f.body.split(concat!("holds_", "outside(")).skip(1) {
             let reasons = reason.split_once(']').map_or("", |(list, _)| list).trim_start_matches(['&', '[', '\n', ' ']);
             // a constant of the file stands for its text
@@ -242,6 +246,9 @@ mod tests {
         assert_eq!(names, expected);
         assert_eq!(found[0].assumptions, ["claim: positive(room)"]);
         assert!(found[1].assumptions.is_empty());
+        let unvisited =
+            "fn claim() {\n    proof.may_be_empty(\"rare\");\n}\n\n#[test]\nfn identity_x() {\n    holds(claim);\n}\n";
+        assert_eq!(tests("a", unvisited)[0].assumptions, ["paths without a point are not shown to be empty: rare"]);
         let left_out = "const LIMITED: &str = \"a drive is at its limit\";\n\n#[test]\nfn identity_x() {\n    \
             holds_outside(&[LIMITED], claim);\n}\n";
         assert_eq!(tests("a", left_out)[0].assumptions, ["nothing is claimed where a drive is at its limit"]);
