@@ -199,6 +199,21 @@ pub enum ReadError {
         /// Time from the first to the last row, s.
         duration_s: f64,
     },
+    /// The file would take more memory than is allowed.
+    #[error(
+        "{}: {what} would take up to {} MB of memory, {} MB are allowed; wanted a smaller recording or a larger limit",
+        path.display(), needed.div_ceil(1_000_000), allowed / 1_000_000
+    )]
+    TooLarge {
+        /// The path as given.
+        path: PathBuf,
+        /// What is too large.
+        what: String,
+        /// Bytes that it would take at most.
+        needed: u64,
+        /// Bytes that are allowed.
+        allowed: u64,
+    },
     /// The Parquet file cannot be decoded.
     #[error("{}: is not a Parquet file that can be read here: {what}", path.display())]
     Parquet {

@@ -16,6 +16,7 @@ mod csv;
 mod dropped;
 mod error;
 mod layout;
+mod memory;
 mod naming;
 mod open;
 mod parquet;
@@ -29,6 +30,7 @@ pub use campaign::{Campaign, Instrument, Role, Run, RunKind};
 pub use channel::Channel;
 pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};
+pub use memory::{limit_memory, memory_limit, panic_is_answer};
 pub use naming::Naming;
 pub use unknown::{Cells, UnknownColumn};
 

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use super::error::ReadError;
 use super::naming::Naming;
-use super::{Recording, arrays, csv, parquet};
+use super::{Recording, arrays, csv, memory, parquet};
 
 const WANTED: &str = "CSV text in UTF-8, Parquet, MATLAB's .mat or HDF5";
 /// First bytes that tell every kind of file.
@@ -41,9 +41,8 @@ impl Recording {
         let mut recording = if head.starts_with(b"PAR1") {
             parquet::read(file, naming, path)?
         } else if arrays::is_one(&head) {
-            let mut bytes = head;
-            file.read_to_end(&mut bytes).map_err(io)?;
-            arrays::read(bytes, naming, path)?
+            memory::allow(metadata.len(), "the file", path)?;
+            arrays::read(whole(head, file, path)?, naming, path)?
         } else {
             refuse_other_kinds(&head, path)?;
             let size = metadata.is_file().then_some(metadata.len());
@@ -63,9 +62,7 @@ impl Recording {
         let mut head = Vec::with_capacity(16);
         (&mut reader).take(HEAD).read_to_end(&mut head).map_err(io)?;
         let mut recording = if arrays::is_one(&head) {
-            let mut bytes = head;
-            reader.read_to_end(&mut bytes).map_err(io)?;
-            arrays::read(bytes, naming, source)?
+            arrays::read(whole(head, reader, source)?, naming, source)?
         } else if head.starts_with(b"PAR1") {
             let what = "is Parquet, which is read from its end".to_owned();
             return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
@@ -85,6 +82,14 @@ impl Recording {
         refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
         csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
     }
+}
+
+/// All bytes of a file, which may have no end.
+fn whole(head: Vec<u8>, rest: impl Read, source: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut bytes = head;
+    rest.take(memory::memory_limit()).read_to_end(&mut bytes).map_err(|error| ReadError::io(source, error))?;
+    memory::allow(bytes.len() as u64, "the file", source)?;
+    Ok(bytes)
 }
 
 fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {

@@ -9,20 +9,36 @@ use crate::naming::Naming;
 use crate::table::{Missing, Places, Table};
 use crate::unknown::Cells;
 
+/// What an array is that is of another form.
+const NEITHER: &str = "is neither a column nor a table of columns";
 /// Columns that a matrix may have: one with more is no list of channels.
 const MOST_COLUMNS: usize = 64;
 
 /// A named array of numbers, or why it is none.
-pub(super) type Named = (String, Result<Vec<f64>, &'static str>);
+pub(super) type Named = (String, Result<Vec<f64>, String>);
 
 pub(super) fn refuse(source: &Path, kind: &'static str, what: String) -> ReadError {
     ReadError::Container { path: source.to_path_buf(), kind, what }
 }
 
+/// Why an array of this size is not read, given how many values the time has.
+#[cfg(feature = "hdf5")]
+pub(super) fn unneeded(size: &[u64], rows: u64) -> Option<String> {
+    let long: Vec<u64> = size.iter().copied().filter(|n| *n > 1).collect();
+    let values = match *long.as_slice() {
+        // none of a dimension, or one
+        [] => size.iter().copied().min().unwrap_or(1),
+        [values] => values * u64::from(!size.contains(&0)),
+        [values, columns] if columns <= MOST_COLUMNS as u64 => values,
+        _ => return Some(NEITHER.into()),
+    };
+    (values != rows).then(|| format!("has {values} values, the time {rows},"))
+}
+
 /// Adds an array: a vector as it is, a matrix column by column.
 pub(super) fn push(arrays: &mut Vec<Named>, name: &str, size: &[usize], values: Option<Vec<f64>>, by_columns: bool) {
     let Some(values) = values else {
-        arrays.push((name.to_owned(), Err("holds no real numbers")));
+        arrays.push((name.to_owned(), Err("holds no real numbers".into())));
         return;
     };
     let long: Vec<usize> = size.iter().copied().filter(|n| *n > 1).collect();
@@ -38,7 +54,7 @@ pub(super) fn push(arrays: &mut Vec<Named>, name: &str, size: &[usize], values: 
                 arrays.push((format!("{name}(:,{})", c + 1), Ok(column)));
             }
         }
-        _ => arrays.push((name.to_owned(), Err("is neither a column nor a table of columns"))),
+        _ => arrays.push((name.to_owned(), Err(NEITHER.into()))),
     }
 }
 

@@ -1,62 +1,97 @@
 //! HDF5, and MATLAB's `.mat` of version 7.3, which is HDF5.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::collections::HashMap;
 use std::path::Path;
 
 use crate::Recording;
 use crate::admission;
-use crate::arrays::columns::{Named, push, refuse, table};
+use crate::arrays::columns::{Named, push, refuse, table, unneeded};
+use crate::channel::Channel;
 use crate::error::ReadError;
+use crate::memory::{self, PER_NUMBER, PER_TEXT};
 use crate::naming::Naming;
 
+const KIND: &str = "an HDF5 file";
 /// Groups within groups that are looked into.
 const DEEPEST_GROUP: usize = 8;
 
+/// A data set that may be a column.
+struct Listed {
+    path: String,
+    size: Vec<u64>,
+}
+
 /// Reads a recording from the bytes of an HDF5 file.
 pub(super) fn read(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
-    let decoded = catch_unwind(AssertUnwindSafe(|| -> Result<Vec<Named>, hdf5_pure::Error> {
-        let file = hdf5_pure::File::from_bytes(bytes)?;
-        let mut arrays = Vec::new();
-        look_through(&file.root(), "", DEEPEST_GROUP, &mut arrays)?;
-        Ok(arrays)
-    }));
-    let arrays = decoded.map_or_else(|_| Err("the file is damaged".to_owned()), |r| r.map_err(|e| e.to_string()));
-    let arrays = shortened(arrays.map_err(|what| refuse(source, "an HDF5 file", what))?);
+    let damaged = || refuse(source, KIND, "the file is damaged".to_owned());
+    let arrays = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
     admission::admit(table(arrays, naming, source)?, source)
+}
+
+fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Vec<Named>, ReadError> {
+    let say = |error: hdf5_pure::Error| refuse(source, KIND, error.to_string());
+    let held = bytes.len() as u64;
+    let file = hdf5_pure::File::from_bytes(bytes).map_err(say)?;
+    let mut listed = Vec::new();
+    look_through(&file.root(), "", DEEPEST_GROUP, &mut listed).map_err(say)?;
+    let names = shortened(&listed);
+    let time = names.iter().position(|name| naming.channel(name) == Some(Channel::Time));
+    let rows = time.map(|at| listed[at].size.iter().copied().fold(1, u64::saturating_mul));
+    let unneeded: Vec<Option<String>> =
+        listed.iter().map(|array| rows.and_then(|rows| unneeded(&array.size, rows))).collect();
+    let mut needed = held;
+    for (array, _) in listed.iter().zip(&unneeded).filter(|(_, unneeded)| unneeded.is_none()) {
+        let dataset = file.dataset(&array.path).map_err(say)?;
+        let element = dataset.element_size().map_err(say)?;
+        let values = array.size.iter().copied().fold(1, u64::saturating_mul);
+        // a part of an array is unfolded as a whole, whatever of it is used
+        let part = dataset.chunk_shape().map_err(say)?.unwrap_or_default().into_iter().fold(1, u64::saturating_mul);
+        needed = needed.saturating_add(values.saturating_mul(PER_NUMBER + PER_TEXT + element));
+        memory::allow(needed.saturating_add(part.saturating_mul(2 * element)), "its arrays", source)?;
+    }
+    let mut arrays = Vec::new();
+    for ((array, name), unneeded) in listed.iter().zip(&names).zip(unneeded) {
+        if let Some(why) = unneeded {
+            arrays.push((name.clone(), Err(why)));
+            continue;
+        }
+        // texts and compounds are no columns
+        let values = file.dataset(&array.path).map_err(say)?.read_f64().ok();
+        let size: Vec<usize> = array.size.iter().map(|&n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
+        push(&mut arrays, name, &size, values, false);
+    }
+    Ok(arrays)
 }
 
 fn look_through(
     group: &hdf5_pure::Group,
     path: &str,
     depth: usize,
-    arrays: &mut Vec<Named>,
+    listed: &mut Vec<Listed>,
 ) -> Result<(), hdf5_pure::Error> {
     for name in group.datasets()? {
-        let dataset = group.dataset(&name)?;
-        let size: Vec<usize> = dataset.shape()?.iter().map(|&n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
-        // texts and compounds are no columns
-        let values = dataset.read_f64().ok();
-        push(arrays, &format!("{path}{name}"), &size, values, false);
+        let size = group.dataset(&name)?.shape()?;
+        listed.push(Listed { path: format!("{path}{name}"), size });
     }
     for name in group.groups()?.into_iter().filter(|_| depth > 0) {
         // MATLAB keeps its own bookkeeping there
         if name != "#refs#" {
-            look_through(&group.group(&name)?, &format!("{path}{name}/"), depth - 1, arrays)?;
+            look_through(&group.group(&name)?, &format!("{path}{name}/"), depth - 1, listed)?;
         }
     }
     Ok(())
 }
 
 /// The last part of each path where it is no other's.
-fn shortened(arrays: Vec<Named>) -> Vec<Named> {
+fn shortened(listed: &[Listed]) -> Vec<String> {
     let last = |path: &str| path.rsplit('/').next().unwrap_or(path).to_owned();
-    let ends: Vec<String> = arrays.iter().map(|(path, _)| last(path)).collect();
-    arrays
-        .into_iter()
-        .map(|(path, values)| {
-            let end = last(&path);
-            let alone = ends.iter().filter(|e| **e == end).count() == 1;
-            (if alone { end } else { path }, values)
-        })
-        .collect()
+    let mut times: HashMap<String, usize> = HashMap::new();
+    for array in listed {
+        *times.entry(last(&array.path)).or_default() += 1;
+    }
+    let name = |array: &Listed| {
+        let end = last(&array.path);
+        if times[&end] == 1 { end } else { array.path.clone() }
+    };
+    listed.iter().map(name).collect()
 }

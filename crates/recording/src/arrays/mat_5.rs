@@ -1,27 +1,83 @@
 //! MATLAB's `.mat` of version 5.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::io::Read as _;
 use std::path::Path;
 
+use flate2::read::ZlibDecoder;
 use matfile::{MatFile, NumericData};
 
 use crate::Recording;
 use crate::admission;
 use crate::arrays::columns::{push, refuse, table};
 use crate::error::ReadError;
+use crate::memory::{self, PER_NUMBER};
 use crate::naming::Naming;
 
 /// Reads a recording from the bytes of a `.mat` file of version 5.
 pub(super) fn read(bytes: &[u8], naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
+    let unfolded = unfolded(bytes, source)?;
     // the decoder is not proof against every damaged file
-    let decoded = catch_unwind(AssertUnwindSafe(|| MatFile::parse(bytes).map_err(|e| e.to_string())));
-    let file = decoded.unwrap_or_else(|_| Err("the file is damaged".into()));
-    let file = file.map_err(|what| refuse(source, "a MATLAB file", what))?;
+    let decoded = memory::guarded(|| MatFile::parse(unfolded.as_slice()).map_err(|e| e.to_string()));
+    let file = decoded.unwrap_or_else(|| Err("the file is damaged".into()));
+    drop(unfolded);
+    let file = file.map_err(|what| refuse(source, KIND, what))?;
     let mut arrays = Vec::new();
     for array in file.arrays() {
         push(&mut arrays, array.name(), array.size(), real(array.data()), true);
     }
     admission::admit(table(arrays, naming, source)?, source)
+}
+
+const KIND: &str = "a MATLAB file";
+/// Bytes before the first array.
+const HEADER: usize = 128;
+/// Type of an element that is compressed.
+const COMPRESSED: u32 = 15;
+/// Where an array's size stands in it: after its own tag, its flags and the tag of the size.
+const SIZE_AT: usize = 8 + 16;
+
+/// The same file with nothing compressed. Deflate unfolds a byte to a thousand, and MATLAB stores numbers in as few
+/// bytes as they need: what all that takes is asked before it is there.
+fn unfolded(bytes: &[u8], source: &Path) -> Result<Vec<u8>, ReadError> {
+    let head = bytes.get(..HEADER).ok_or_else(|| refuse(source, KIND, "the file is damaged".into()))?;
+    let is_big = head.ends_with(b"MI");
+    let word = |bytes: &[u8], at: usize| -> Option<u32> {
+        let word: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
+        Some(if is_big { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
+    };
+    let mut out = head.to_vec();
+    let mut needed = 0_u64;
+    let mut at = HEADER;
+    while let (Some(kind), Some(length)) = (word(bytes, at), word(bytes, at + 4)) {
+        let body = &bytes[at + 8..];
+        let length = usize::try_from(length).unwrap_or(usize::MAX).min(body.len());
+        let begins = out.len();
+        if kind == COMPRESSED {
+            let say = |error: std::io::Error| refuse(source, KIND, error.to_string());
+            let folded = ZlibDecoder::new(&body[..length]);
+            let mut tag = Vec::new();
+            let mut folded = folded.take(8);
+            folded.read_to_end(&mut tag).map_err(say)?;
+            let stated = word(&tag, 4).map_or(0, u64::from);
+            memory::allow(needed.saturating_add(2 * stated), "its arrays", source)?;
+            out.append(&mut tag);
+            folded.set_limit(stated);
+            folded.read_to_end(&mut out).map_err(say)?;
+            at += 8 + length;
+        } else {
+            let padded = length.next_multiple_of(8).min(body.len());
+            out.extend_from_slice(&bytes[at..at + 8 + padded]);
+            at += 8 + padded;
+        }
+        let array = &out[begins..];
+        let dimensions = word(array, SIZE_AT + 4).unwrap_or(0) as usize / 4;
+        let sizes =
+            (0..dimensions.min(array.len() / 4)).map(|d| u64::from(word(array, SIZE_AT + 8 + 4 * d).unwrap_or(0)));
+        let values = sizes.fold(1_u64, u64::saturating_mul).min(array.len() as u64);
+        needed = needed.saturating_add(2 * array.len() as u64).saturating_add(values.saturating_mul(PER_NUMBER));
+        memory::allow(needed, "its arrays", source)?;
+    }
+    Ok(out)
 }
 
 fn real(data: &NumericData) -> Option<Vec<f64>> {

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::piece::{Dialect, Fault, Piece, Short};
 use crate::error::{Place, ReadError};
+use crate::memory::{self, PER_TEXT};
 use crate::table::{Places, Table};
 
 /// A table that grows piece by piece.
@@ -91,6 +92,8 @@ impl<'a> Assembly<'a> {
             self.table.blank_lines.first.get_or_insert(Place::Line(blank + first_line));
             self.table.blank_lines.count += piece.blank_lines;
         }
+        let row = 2 * 8 * self.table.numbers.len() + PER_TEXT as usize * self.table.unknown.len();
+        memory::allow((self.table.rows + piece.rows) as u64 * row as u64, "the rows so far", self.source)?;
         self.table.unterminated = piece.unterminated.map(|line| Place::Line(line + first_line));
         self.table.rows += piece.rows;
         self.next_line += piece.lines;

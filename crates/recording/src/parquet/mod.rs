@@ -5,6 +5,8 @@
 #[cfg(feature = "parquet")]
 mod read;
 #[cfg(feature = "parquet")]
+mod sizes;
+#[cfg(feature = "parquet")]
 mod write;
 
 #[cfg(feature = "parquet")]

@@ -3,7 +3,6 @@
 //! Nested columns and times of day are refused where a number is wanted, and left out with a warning where nothing is.
 
 use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use parquet::basic::{Compression, LogicalType};
@@ -17,7 +16,9 @@ use crate::Recording;
 use crate::admission;
 use crate::error::{Place, ReadError};
 use crate::layout::{Field, Layout};
+use crate::memory;
 use crate::naming::Naming;
+use crate::parquet::sizes;
 use crate::table::{Missing, Places, Table};
 use crate::unknown::Cells;
 
@@ -26,13 +27,14 @@ const BATCH_ROWS: usize = 64 << 10;
 /// Reads a recording.
 pub(crate) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     // The decoder asserts what a damaged file does not hold.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode(file, naming, source)));
-    let damaged = |_| ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };
-    admission::admit(decoded.map_err(damaged)??, source)
+    let decoded = memory::guarded(|| decode(file, naming, source));
+    let damaged = || ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };
+    admission::admit(decoded.ok_or_else(damaged)??, source)
 }
 
 fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError> {
     let refuse = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
+    let pages = file.try_clone().map_err(|error| ReadError::io(source, error))?;
     let reader = SerializedFileReader::new(file).map_err(|error| refuse(error.to_string()))?;
     let descriptions = reader.metadata().file_metadata().schema_descr_ptr();
     let mut warnings = vec![];
@@ -54,6 +56,8 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
     table.warnings = warnings;
     refuse_codecs(&reader, &kept, source)?;
+    let is_text: Vec<bool> = layout.fields.iter().map(|field| matches!(field, Field::Text(_))).collect();
+    sizes::check(reader.metadata(), &kept, &is_text, pages, source)?;
 
     // One after the other: readers of one file share its position.
     let columns: Vec<Column> = kept
@@ -144,6 +148,7 @@ fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> 
     };
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group)?;
+        let most = column.len() + usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         let description = group.metadata().column(at).column_descr_ptr();
         let is_unsigned = matches!(description.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
         // Unsigned integers are stored in the bits of signed ones.
@@ -182,6 +187,9 @@ fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> 
                 }
             }
             _ => return Err(ParquetError::General(format!("column `{}` changes its type", description.name()))),
+        }
+        if column.len() > most {
+            return Err(ParquetError::General(format!("column `{}` has more rows than it says", description.name())));
         }
     }
     Ok(column)
