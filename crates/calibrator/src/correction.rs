@@ -1,0 +1,185 @@
+//! The compensation in force: the inverse of the electronics as far as they are known, and the mechanics beside it.
+//!
+//! It refuses to learn: it is moved by what the filter found, as a whole or not at all.
+
+use cvg_model::{AxisForces, Envelope, Float};
+
+use crate::complex::{Complex, Matrix};
+use crate::parameters::{DETECTION, OTHERS, Parameter, Vector, get, set};
+
+/// How far a value in force may be from a perfect instrument, in units of what is expected of devices.
+const FARTHEST: f64 = 12.0;
+
+/// What is undone, and what the mechanics are known to do. Readout: x, y in amplitudes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction<T> {
+    /// offsets, cubic and mechanics; what stands in the matrices instead is 0 here
+    pub(crate) known: Vector<T>,
+    /// what the Y readout makes of Y: (1 + γ) e^(−iψ)
+    pub(crate) y_of_y: Complex<T>,
+    /// what the Y readout makes of X
+    pub(crate) y_of_x: Complex<T>,
+    /// what the drives make of commands, seen through the compensated readout
+    pub(crate) drives: Matrix<T>,
+    y_inverse: Complex<T>,
+    pub(crate) drives_inverse: Matrix<T>,
+}
+
+impl<T: Float> Correction<T> {
+    /// Nothing is undone; `damping_per_s` is what the mechanics are designed to have.
+    pub fn none(damping_per_s: T) -> Self {
+        let mut known = [T::zero(); _];
+        set(&mut known, Parameter::Damping, damping_per_s);
+        let (zero, one) = (Complex::real(T::zero()), Complex::real(T::one()));
+        let identity = Matrix::identity();
+        Self { known, y_of_y: one, y_of_x: zero, drives: identity, y_inverse: one, drives_inverse: identity }
+    }
+
+    //= specs/self-calibration.md#bounded
+    //# Every value in force MUST be finite and one that a device can have for every input.
+    /// A correction of these parts; none where they can't be inverted or no device is like that.
+    pub(crate) fn of(known: Vector<T>, y_of_y: Complex<T>, y_of_x: Complex<T>, drives: Matrix<T>) -> Option<Self> {
+        let drives_inverse = drives.inverse()?;
+        let near = |z: Complex<T>, target: T, reach: f64| {
+            (z.re - target).within(T::from_f64(reach)) && z.im.within(T::from_f64(reach))
+        };
+        let (zero, one) = (T::zero(), T::one());
+        let plausible = near(y_of_y, one, 0.36)
+            && near(y_of_x, zero, 0.12)
+            && near(drives.xx, one, 0.5)
+            && near(drives.yy, one, 0.5)
+            && near(drives.xy, zero, 0.2)
+            && near(drives.yx, zero, 0.2)
+            && Parameter::ALL.iter().all(|p| get(&known, *p).within(p.expected::<T>() * T::from_f64(FARTHEST)));
+        plausible.then(|| Self { known, y_of_y, y_of_x, drives, y_inverse: y_of_y.inverse(), drives_inverse })
+    }
+
+    //= specs/self-calibration.md#undone
+    //# A correction MUST undo a readout of its own ratio, skew, phase and offsets.
+    /// The readout undone: volts in, volts out, at a set amplitude of `amplitude_v`.
+    #[inline]
+    pub(crate) fn readout(&self, e: &Envelope<T>, amplitude_v: T, per_amplitude: T) -> Envelope<T> {
+        let offset = |p| get(&self.known, p) * amplitude_v;
+        let x = Complex::new(e.x_c - offset(Parameter::OffsetX), -e.x_s);
+        let y = Complex::new(e.y_c - offset(Parameter::OffsetY), -e.y_s);
+        let y = (y - self.y_of_x * x) * self.y_inverse;
+        let cubic = get(&self.known, Parameter::Cubic) * per_amplitude.squared();
+        let straight = |z: Complex<T>| {
+            let m = cubic * z.squared_norm();
+            let once = T::one() + m;
+            let by = T::one() / (T::one() + m / once.squared());
+            Complex::new(z.re * by, z.im * by)
+        };
+        let (x, y) = (straight(x), straight(y));
+        Envelope::new(x.re, -x.im, y.re, -y.im)
+    }
+
+    /// The drives undone: what to command for the forces that are wanted. A force in sine phase pushes against the
+    /// cosine of the vibration, one in cosine phase along its sine: F_s + iF_c turns as the vibration does.
+    #[inline]
+    pub(crate) fn drive(&self, f: &AxisForces<T>) -> AxisForces<T> {
+        let (x, y) = self.drives_inverse.apply(Complex::new(f.x_s, f.x_c), Complex::new(f.y_s, f.y_c));
+        AxisForces { x_c: x.im, x_s: x.re, y_c: y.im, y_s: y.re }
+    }
+
+    /// Moved by `delta`, exactly: the mechanics and the drives seen through the new readout, then their own changes.
+    /// None where the outcome is no instrument.
+    pub(crate) fn moved(&self, delta: &Vector<T>) -> Option<Self> {
+        let d = |p| get(delta, p);
+        let (one, zero) = (T::one(), T::zero());
+        let mut known = self.known;
+        let (mut y_of_y, mut y_of_x, mut drives) = (self.y_of_y, self.y_of_x, self.drives);
+        if delta.iter().skip(OTHERS).take(DETECTION).any(|d| *d != zero) {
+            let (sin, cos) = d(Parameter::DetectionPhase).sin_cos();
+            let ratio = one + d(Parameter::DetectionRatio);
+            let step = Matrix {
+                xx: Complex::real(one),
+                xy: Complex::real(zero),
+                yx: Complex::real(d(Parameter::DetectionSkew)),
+                yy: Complex::new(ratio * cos, -(ratio * sin)),
+            };
+            let back = step.inverse()?;
+            set_mechanics(&mut known, &back.times(&mechanics(&self.known).times(&step)));
+            drives = back.times(&drives);
+            y_of_x = y_of_x + y_of_y * step.yx;
+            y_of_y = y_of_y * step.yy;
+        }
+        for (p, change) in Parameter::ALL.iter().zip(delta) {
+            if is_mechanical(*p) {
+                let value = get(&known, *p) + *change;
+                set(&mut known, *p, value);
+            }
+        }
+        let (scale, turn) = (d(Parameter::ForceScale), d(Parameter::ForceRotation));
+        let phase = d(Parameter::ForcePhase);
+        let change = Matrix {
+            xx: Complex::new(one + scale, phase),
+            xy: Complex::real(-turn),
+            yx: Complex::real(turn + d(Parameter::ForceSkew)),
+            yy: Complex::new(one + scale + d(Parameter::ForceRatio), phase + d(Parameter::ForcePhaseDifference)),
+        };
+        drives = change.times(&drives);
+        // no parameter is the phase of a skew: what can't be learned isn't kept either
+        drives.xy.im = zero;
+        drives.yx.im = zero;
+        Self::of(known, y_of_y, y_of_x, drives)
+    }
+
+    /// γ in force.
+    pub fn detection_ratio(&self) -> T {
+        self.y_of_y.squared_norm().sqrt() - T::one()
+    }
+
+    /// ψ in force, rad: how far the Y readout is behind that of X.
+    pub fn detection_phase(&self) -> T {
+        (-self.y_of_y.im).atan2(self.y_of_y.re)
+    }
+
+    /// s in force.
+    pub fn detection_skew(&self) -> T {
+        self.y_of_x.re
+    }
+}
+
+/// What is added up, rather than composed.
+fn is_mechanical(p: Parameter) -> bool {
+    matches!(
+        p,
+        Parameter::OffsetX
+            | Parameter::OffsetY
+            | Parameter::Cubic
+            | Parameter::Damping
+            | Parameter::AnisodampingCos
+            | Parameter::AnisodampingSin
+            | Parameter::SplitCos
+            | Parameter::SplitSin
+            | Parameter::QuadratureRate
+            | Parameter::Rate
+    )
+}
+
+/// The equation of motion at rest as a matrix: Ẋ = M X.
+fn mechanics<T: Float>(v: &Vector<T>) -> Matrix<T> {
+    let k = |p| get(v, p);
+    let half = T::half();
+    let (damping, dc, ds) = (k(Parameter::Damping), k(Parameter::AnisodampingCos), k(Parameter::AnisodampingSin));
+    let (kc, ks) = (half * k(Parameter::SplitCos), half * k(Parameter::SplitSin));
+    let (q, b) = (k(Parameter::QuadratureRate), k(Parameter::Rate));
+    Matrix {
+        xx: Complex::new(-damping - dc, -kc),
+        xy: Complex::new(-ds - b, q - ks),
+        yx: Complex::new(b - ds, -ks - q),
+        yy: Complex::new(dc - damping, kc),
+    }
+}
+
+fn set_mechanics<T: Float>(v: &mut Vector<T>, m: &Matrix<T>) {
+    let half = T::half();
+    set(v, Parameter::Damping, -(half * (m.xx.re + m.yy.re)));
+    set(v, Parameter::AnisodampingCos, half * (m.yy.re - m.xx.re));
+    set(v, Parameter::AnisodampingSin, -(half * (m.xy.re + m.yx.re)));
+    set(v, Parameter::SplitCos, m.yy.im - m.xx.im);
+    set(v, Parameter::SplitSin, -(m.xy.im + m.yx.im));
+    set(v, Parameter::QuadratureRate, half * (m.xy.im - m.yx.im));
+    set(v, Parameter::Rate, half * (m.yx.re - m.xy.re));
+}

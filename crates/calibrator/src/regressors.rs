@@ -1,0 +1,161 @@
+//! What a unit of each parameter does to amplitude, angle and ellipticity: the equation of motion, differentiated.
+//!
+//! With A the share of an error of the readout along the pattern and T that across it (over the amplitude),
+//!
+//! $$\frac{d}{dt}\ln a = f_u + r g_n - \tfrac1\tau - d_c c_2 - d_s s_2,\quad
+//!   \dot\theta = f_n + d_c s_2 - d_s c_2 + (k_c c_2 + k_s s_2) r + b,\quad
+//!   \dot\varepsilon = g_n - \tfrac12(k_c s_2 - k_s c_2) + q_0 - r f_u$$
+//!
+//! Ratio and skew of the detection, and its phase, have no part here: at rest they can't be told from the drives. What
+//! excites them is the turn that no force explains ([`turned`]).
+
+use cvg_model::Float;
+
+use crate::parameters::{N, Parameter, Vector, get, set};
+use crate::window::{Push, Sample};
+
+/// Amplitude, angle, ellipticity.
+pub(crate) const CHANNELS: usize = 3;
+
+/// Rates of channel `c` per expected unit of each parameter, and what shows at once.
+///
+/// Without a precession that is known, force scale, damping and split are one thing: then, without `scaled_forces`, the
+/// scale is not excited, and the others are what they are in units of the force.
+pub(crate) fn rates<T: Float>(
+    s: &Sample<T>,
+    known: &Vector<T>,
+    c: usize,
+    scaled_forces: bool,
+) -> (Vector<T>, Vector<T>) {
+    let zero = T::zero();
+    let (quarter, half, one) = (T::ratio(1, 4), T::half(), T::one());
+    let (c1, s1, c2, s2) = (s.cos, s.sin, s.cos_2, s.sin_2);
+    let (c4, s4) = (c2 * c2 - s2 * s2, T::two() * c2 * s2);
+    let p = &s.push;
+    let along = [c1 * s.per_amplitude, s1 * s.per_amplitude, quarter * c4];
+    let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s4];
+    let chi = get(known, Parameter::SplitCos) * c2 + get(known, Parameter::SplitSin) * s2;
+    let readout = |at: usize| {
+        let (a, t) = (along.get(at).copied().unwrap_or(zero), across.get(at).copied().unwrap_or(zero));
+        match c {
+            0 => a * p.along - t * p.aside,
+            1 => t * p.along + a * p.aside,
+            _ => t * chi + a * p.quadrature,
+        }
+    };
+    let fx = p.along * c1 - p.aside * s1;
+    let fy = p.along * s1 + p.aside * c1;
+    let gx = p.across * c1 - p.quadrature * s1;
+    let gy = p.across * s1 + p.quadrature * c1;
+    // offsets, cubic; scale, ratio, skew, rotation, phase, phase difference; damping; split; constant rates; detection
+    let mut h: Vector<T> = match c {
+        0 => [
+            readout(0),
+            readout(1),
+            readout(2),
+            p.along,
+            fy * s1,
+            fx * s1,
+            -p.aside,
+            p.across,
+            gy * s1,
+            -one,
+            -c2,
+            -s2,
+            zero,
+            zero,
+            zero,
+            zero,
+            zero,
+            zero,
+            zero,
+        ],
+        1 => [
+            readout(0),
+            readout(1),
+            readout(2),
+            p.aside,
+            fy * c1,
+            fx * c1,
+            p.along,
+            p.quadrature,
+            gy * c1,
+            zero,
+            s2,
+            -c2,
+            c2 * s.r,
+            s2 * s.r,
+            zero,
+            one,
+            zero,
+            zero,
+            zero,
+        ],
+        _ => [
+            readout(0),
+            readout(1),
+            readout(2),
+            p.quadrature,
+            gy * c1,
+            gx * c1,
+            p.across,
+            -p.aside,
+            -(fy * c1),
+            zero,
+            zero,
+            zero,
+            -(half * s2),
+            half * c2,
+            one,
+            zero,
+            zero,
+            zero,
+            zero,
+        ],
+    };
+    if !scaled_forces {
+        set(&mut h, Parameter::ForceScale, zero);
+    }
+    let mut direct = [zero; N];
+    let shown = match c {
+        0 => along,
+        1 => across,
+        _ => [zero; 3],
+    };
+    for (slot, value) in direct.iter_mut().zip(shown) {
+        *slot = value;
+    }
+    (scaled(h), scaled(direct))
+}
+
+/// What a turn of `turn` rad that no force explains shows of the detection in channel `c`: half of it at this cycle's
+/// angle.
+pub(crate) fn turned<T: Float>(c: usize, cos_2: T, sin_2: T, turn: T) -> [T; 3] {
+    let zero = T::zero();
+    let unit = |p: Parameter| p.expected::<T>() * turn;
+    match c {
+        0 => [zero, sin_2 * unit(Parameter::DetectionRatio), cos_2 * unit(Parameter::DetectionSkew)],
+        1 => [zero; 3],
+        _ => [cos_2 * unit(Parameter::DetectionPhase), zero, zero],
+    }
+}
+
+/// The rates of the three channels as far as they are known, for pushes over the amplitude and `r` = ½Q/√(E² − Q²).
+#[inline]
+pub(crate) fn known_rates<T: Float>(p: &Push<T>, r: T, (c2, s2): (T, T), known: &Vector<T>) -> [T; 3] {
+    let k = |p| get(known, p);
+    let (dc, ds) = (k(Parameter::AnisodampingCos), k(Parameter::AnisodampingSin));
+    let (kc, ks) = (k(Parameter::SplitCos), k(Parameter::SplitSin));
+    [
+        p.along + r * p.quadrature - k(Parameter::Damping) - dc * c2 - ds * s2,
+        p.aside + dc * s2 - ds * c2 + (kc * c2 + ks * s2) * r + k(Parameter::Rate),
+        p.quadrature - T::half() * (kc * s2 - ks * c2) + k(Parameter::QuadratureRate) - r * p.along,
+    ]
+}
+
+fn scaled<T: Float>(mut h: Vector<T>) -> Vector<T> {
+    for (slot, p) in h.iter_mut().zip(Parameter::ALL) {
+        *slot = *slot * p.expected();
+    }
+    h
+}

@@ -1,0 +1,249 @@
+//! A covariance that can't lose its sign: P = U D Uᵀ, U unit upper triangular, D diagonal and positive (Bierman 1977).
+//!
+//! A measurement is taken in three parts, so that no control step does more than a few columns: [`Ud::project`] column
+//! by column, then [`Ud::open`], then [`Ud::absorb`] column by column. It refuses to know what the parameters mean.
+
+use cvg_model::Float;
+
+use crate::parameters::N;
+
+/// Columns of U above its diagonal, one after the other.
+pub const ABOVE: usize = N * (N - 1) / 2;
+
+/// The factors of a covariance of [`N`] parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ud<T> {
+    above: [T; ABOVE],
+    d: [T; N],
+}
+
+/// A measurement that is being taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Update<T> {
+    /// Uᵀh
+    f: [T; N],
+    /// the gain so far
+    gain: [T; N],
+    /// variance of the innovation so far
+    alpha: T,
+    inverse: T,
+    noise: T,
+}
+
+impl<T: Float> Update<T> {
+    /// Nothing taken yet.
+    pub fn idle() -> Self {
+        let zeros = [T::zero(); N];
+        Self { f: zeros, gain: zeros, alpha: T::zero(), inverse: T::zero(), noise: T::zero() }
+    }
+
+    /// What the innovation is to be divided by for the gain; 0 before the last column.
+    pub fn inverse(&self) -> T {
+        self.inverse
+    }
+
+    /// The gain times the innovation's variance, once every column is absorbed.
+    pub fn gain(&self) -> &[T; N] {
+        &self.gain
+    }
+}
+
+impl<T: Float> Ud<T> {
+    /// Independent parameters of variance `d`.
+    pub fn diagonal(d: T) -> Self {
+        Self { above: [T::zero(); ABOVE], d: [d; N] }
+    }
+
+    /// U_0j … U_(j−1)j; empty for a column there isn't.
+    #[inline]
+    pub fn column(&self, j: usize) -> &[T] {
+        let (start, end) = bounds(j);
+        self.above.get(start..end).unwrap_or(&[])
+    }
+
+    #[inline]
+    fn column_mut(&mut self, j: usize) -> &mut [T] {
+        let (start, end) = bounds(j);
+        self.above.get_mut(start..end).unwrap_or(&mut [])
+    }
+
+    /// D_jj; 0 for a column there isn't.
+    #[inline]
+    pub fn d(&self, j: usize) -> T {
+        self.d.get(j).copied().unwrap_or(T::zero())
+    }
+
+    /// U_ij for i < j.
+    #[inline]
+    pub fn u(&self, i: usize, j: usize) -> T {
+        self.column(j).get(i).copied().unwrap_or(T::zero())
+    }
+
+    /// P_ij.
+    pub fn covariance(&self, i: usize, j: usize) -> T {
+        let unit = |row: usize, k: usize| if row == k { T::one() } else { self.u(row, k) };
+        let first = if i > j { i } else { j };
+        (first..N).fold(T::zero(), |sum, k| sum + unit(i, k) * unit(j, k) * self.d(k))
+    }
+
+    /// P_jj.
+    pub fn variance(&self, j: usize) -> T {
+        self.covariance(j, j)
+    }
+
+    /// hᵀPh.
+    pub fn variance_along(&self, h: &[T; N]) -> T {
+        (0..N).fold(T::zero(), |sum, j| sum + self.d(j) * self.projected(h, j).squared())
+    }
+
+    #[inline]
+    fn projected(&self, h: &[T; N], j: usize) -> T {
+        let along = h.get(j).copied().unwrap_or(T::zero());
+        self.column(j).iter().zip(h).fold(along, |sum, (u, h)| sum + *u * *h)
+    }
+
+    /// Column `j` of the first pass: f_j = (Uᵀh)_j. Returns what it adds to the innovation's variance.
+    #[inline]
+    pub fn project(&self, update: &mut Update<T>, h: &[T; N], j: usize) -> T {
+        let f = self.projected(h, j);
+        if let Some(slot) = update.f.get_mut(j) {
+            *slot = f;
+        }
+        self.d(j) * f * f
+    }
+
+    /// Between the passes: the measurement's variance is `noise` > 0.
+    #[inline]
+    pub fn open(&self, update: &mut Update<T>, noise: T) {
+        update.alpha = noise;
+        update.inverse = T::one() / noise;
+        update.noise = noise;
+    }
+
+    //= specs/self-calibration.md#positive
+    //# The covariance MUST stay positive through every measurement and every step of its growth.
+    /// Column `j` of the second pass, from 0 to N − 1.
+    #[inline]
+    pub fn absorb(&mut self, update: &mut Update<T>, j: usize) {
+        let Some(f) = update.f.get(j).copied() else { return };
+        let d = self.d(j);
+        let v = d * f;
+        let before = update.alpha;
+        let alpha = before + v * f;
+        let lambda = -(f * update.inverse);
+        let inverse = T::one() / alpha;
+        update.alpha = alpha;
+        update.inverse = inverse;
+        if let Some(slot) = self.d.get_mut(j) {
+            // the ratio is in (0, 1]: a product of positive numbers can't change its sign, and not vanish either
+            *slot = at_least(d * (before * inverse));
+        }
+        for (u, k) in self.column_mut(j).iter_mut().zip(update.gain.iter_mut()) {
+            let old = *u;
+            *u = old + *k * lambda;
+            *k = *k + v * old;
+        }
+        if let Some(slot) = update.gain.get_mut(j) {
+            *slot = v;
+        }
+    }
+
+    /// P ← P + q e_j e_jᵀ begins (Agee and Turner); `a` holds what is still to be spread.
+    pub fn grow_begin(growth: &mut Growth<T>, j: usize, q: T) {
+        growth.a = [T::zero(); N];
+        if let Some(slot) = growth.a.get_mut(j) {
+            *slot = T::one();
+        }
+        growth.q = q;
+        growth.next = j + 1;
+    }
+
+    /// One column more; nothing when all is spread.
+    pub fn grow(&mut self, growth: &mut Growth<T>) {
+        let Some(j) = growth.next.checked_sub(1) else { return };
+        growth.next = j;
+        let Some(s) = growth.a.get(j).copied() else { return };
+        let d = self.d(j);
+        let sum = d + growth.q * s * s;
+        if !(sum > T::zero() && sum.is_finite()) {
+            growth.next = 0;
+            return;
+        }
+        let b = growth.q * s / sum;
+        growth.q = growth.q * (d / sum);
+        if let Some(slot) = self.d.get_mut(j) {
+            *slot = at_least(sum);
+        }
+        for (u, a) in self.column_mut(j).iter_mut().zip(growth.a.iter_mut()) {
+            *a = *a - s * *u;
+            *u = *u + b * *a;
+        }
+    }
+
+    /// The first `count` parameters independent of all and of variance `d`; the others keep their own covariance.
+    pub fn reset(&mut self, count: usize, d: T) {
+        for j in 0..N {
+            if j < count
+                && let Some(slot) = self.d.get_mut(j)
+            {
+                *slot = d;
+            }
+            for u in self.column_mut(j).iter_mut().take(count) {
+                *u = T::zero();
+            }
+        }
+    }
+
+    /// The last three as `factors` say (D, then U above their diagonal), the others independent and of variance `d`.
+    /// None where that is no covariance.
+    pub fn with_last(d: T, factors: &[T; 6]) -> Option<Self> {
+        let mut made = Self::diagonal(d);
+        let [d0, d1, d2, u01, u02, u12] = *factors;
+        let sound = |d: T| d > T::zero() && d <= T::two();
+        if !(sound(d0) && sound(d1) && sound(d2) && [u01, u02, u12].iter().all(|u| u.within(T::from_f64(1e6)))) {
+            return None;
+        }
+        for (slot, d) in made.d.iter_mut().skip(N - 3).zip([d0, d1, d2]) {
+            *slot = d;
+        }
+        for (i, j, u) in [(N - 3, N - 2, u01), (N - 3, N - 1, u02), (N - 2, N - 1, u12)] {
+            if let Some(slot) = made.column_mut(j).get_mut(i) {
+                *slot = u;
+            }
+        }
+        Some(made)
+    }
+
+    /// Whether every number is finite and D positive.
+    pub fn is_sound(&self) -> bool {
+        self.d.iter().all(|d| *d > T::zero() && d.is_finite()) && self.above.iter().all(|u| u.is_finite())
+    }
+}
+
+/// A growth of the covariance under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth<T> {
+    a: [T; N],
+    q: T,
+    next: usize,
+}
+
+impl<T: Float> Growth<T> {
+    /// Nothing to spread.
+    pub fn idle() -> Self {
+        Self { a: [T::zero(); N], q: T::zero(), next: 0 }
+    }
+}
+
+/// Variances are of parameters in units of what they are expected to be: below 10⁻¹⁸ nothing is known better.
+fn at_least<T: Float>(d: T) -> T {
+    let least = T::from_f64(1e-18);
+    if d > least { d } else { least }
+}
+
+#[inline]
+fn bounds(j: usize) -> (usize, usize) {
+    let j = if j < N { j } else { 0 };
+    let start = (j * j.saturating_sub(1)) / 2;
+    (start, start + j)
+}
