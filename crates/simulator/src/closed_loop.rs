@@ -13,6 +13,7 @@ use cvg_model::effects::Moment;
 use cvg_model::resonator::Resonator;
 use cvg_model::{AxisForces, Envelope, Orbit};
 
+use crate::flicker::Wander;
 use crate::noise::Noise;
 use crate::plant::{Plant, reference_ahead};
 use crate::stages::Stages;
@@ -109,6 +110,7 @@ pub struct ClosedLoop {
     reads_plainly: bool,
     noise: Option<Noise>,
     force_noise: Option<Noise>,
+    wander: Wander,
     // state
     sample: u64,
     /// samples since t = 0
@@ -123,11 +125,11 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// The loop at the start of `course`, with its own `noise` and `force_noise`.
+    /// The loop at the start of `course`, with its own `noise` and `force_noise`, and with what wanders in it.
     ///
     /// The vibration starts at its set amplitude, the energy controller with the command that holds it there in a
     /// perfect device, v_as = −a/(τb); everything else settles by itself.
-    pub fn new(design: &Design, course: &Course, noise: Noise, force_noise: Noise) -> Self {
+    pub fn new(design: &Design, course: &Course, noise: Noise, force_noise: Noise, wander: Wander) -> Self {
         let mut legs: Vec<Leg> = course
             .legs
             .iter()
@@ -183,9 +185,11 @@ impl ClosedLoop {
             rate_is_nominal: design.stages.rate_is_nominal(),
             reads_plainly: design.stages.readout.is_empty()
                 && design.readout_compensation.is_none()
-                && design.noise_v == 0.0,
+                && design.noise_v == 0.0
+                && wander.gains.is_none(),
             noise: (design.noise_v > 0.0).then_some(noise),
             force_noise: (design.force_noise_v > 0.0).then_some(force_noise),
+            wander,
             sample: 0,
             tick: 0_i64.saturating_sub_unsigned(course.warm_up_samples),
             table_rad: 0.0,
@@ -263,6 +267,10 @@ impl ClosedLoop {
     #[inline(never)]
     fn imperfect_readout(&mut self, at: &Moment<f64>) -> [Envelope<f64>; 2] {
         let mut readout = self.design.stages.read(self.vibration, at);
+        if let Some([x, y]) = &mut self.wander.gains {
+            let (x, y) = (1.0 + x.step(), 1.0 + y.step());
+            readout = Envelope::new(x * readout.x_c, x * readout.x_s, y * readout.y_c, y * readout.y_s);
+        }
         if let Some(noise) = &mut self.noise {
             readout = readout + noise.envelope(self.design.noise_v);
         }
@@ -300,6 +308,11 @@ impl ClosedLoop {
             let middle = Moment { t_s: at.t_s + 0.5 * period, table_rad: at.table_rad + 0.5 * period * nominal, ..*at };
             self.design.stages.rates(nominal, &middle)
         };
+        let wandered = match &mut self.wander.table {
+            Some(table_rate) => nominal * table_rate.step(),
+            None => 0.0,
+        };
+        let (table, input) = (table + wandered, input + wandered);
         // The reference runs ahead evenly over the period: e^{−iψ/2} before and after the mechanics, which is e^{−iψ} after
         // them with the drives turned by e^{iψ/2}.
         let psi = self.seen.correction_rad_s * period;

@@ -34,6 +34,7 @@
 pub mod campaign;
 pub mod carrier;
 pub mod closed_loop;
+pub mod flicker;
 pub mod noise;
 pub mod plant;
 pub mod scenario;

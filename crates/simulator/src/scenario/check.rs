@@ -9,6 +9,9 @@ use super::{EffectSetting, Instrument, Run, ScenarioError, Settings, Tuning};
 /// The longest recording, rows.
 const MOST_ROWS: f64 = 1e7;
 
+/// A gain that wanders further would change its sign.
+const LARGEST_WANDER: f64 = 0.03;
+
 /// The longest run, control samples.
 const MOST_SAMPLES: f64 = 1e9;
 
@@ -27,8 +30,22 @@ pub(super) fn settings(s: &Settings) -> Result<(), ScenarioError> {
     ] {
         positive(field, value)?;
     }
-    for (field, value) in [("noise_v", s.noise_v), ("force_noise_v", s.force_noise_v), ("warm_up_s", s.warm_up_s)] {
+    for (field, value) in [
+        ("noise_v", s.noise_v),
+        ("force_noise_v", s.force_noise_v),
+        ("gain_flicker", s.gain_flicker),
+        ("table_wander", s.table_wander),
+        ("warm_up_s", s.warm_up_s),
+    ] {
         not_negative(field, value)?;
+    }
+    for (field, value) in [("gain_flicker", s.gain_flicker), ("table_wander", s.table_wander)] {
+        if value >= LARGEST_WANDER {
+            return Err(ScenarioError::invalid(field, format!("{value} has to be below {LARGEST_WANDER}")));
+        }
+        if value > 0.0 && s.instrument == Instrument::Sensor {
+            return Err(ScenarioError::invalid(field, "is of a gyroscope; a sensor has white noise only"));
+        }
     }
     finite("detuning_hz", s.detuning_hz)?;
     for (field, value) in

@@ -13,6 +13,7 @@ use cvg_model::resonator::{Anisotropy, Resonator};
 
 use crate::campaign::Simulated;
 use crate::closed_loop::{ClosedLoop, Course, Design, samples};
+use crate::flicker::{Flicker, Wander};
 use crate::noise::Noise;
 use crate::sensor::Sensor;
 use crate::stages::{Setting, Stages};
@@ -24,6 +25,9 @@ use core::f64::consts::TAU;
 
 /// Fastest precession that the rate loop holds still, rad/s.
 const LARGEST_HELD_RATE_RAD_S: f64 = 50.0;
+
+/// The stream of the first source of what wanders: beyond those of a scenario's white noises.
+const FIRST_WANDER: u64 = 1 << 32;
 
 /// Largest correction of the reference frequency that the phase-locked loop makes, rad/s.
 const LARGEST_CORRECTION_RAD_S: f64 = 600.0;
@@ -100,7 +104,7 @@ impl Scenario {
         }
         let [mut start, noise, force_noise] = self.noises(index);
         let course = self.course(run, start.angle_rad());
-        let mut closed = ClosedLoop::new(&self.design, &course, noise, force_noise);
+        let mut closed = ClosedLoop::new(&self.design, &course, noise, force_noise, self.wander(index));
         closed.warm_up();
         Some(closed)
     }
@@ -144,6 +148,14 @@ impl Scenario {
     fn noises(&self, index: usize) -> [Noise; 3] {
         let first = 3 * index as u64;
         [first, first + 1, first + 2].map(|stream| Noise::new(self.settings.seed, stream))
+    }
+
+    /// What wanders in one run, from sources that no other noise uses.
+    fn wander(&self, index: usize) -> Wander {
+        let source = |which: u64| Noise::new(self.settings.seed, FIRST_WANDER + 3 * index as u64 + which);
+        let flicker = |coefficient, which| Flicker::new(coefficient, source(which), self.design.period_s);
+        let gain = |which| flicker(self.settings.gain_flicker, which);
+        Wander { gains: gain(0).zip(gain(1)).map(|(x, y)| [x, y]), table: flicker(self.settings.table_wander, 2) }
     }
 
     fn course(&self, run: &Run, random_rad: f64) -> Course {

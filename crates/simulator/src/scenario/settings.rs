@@ -44,6 +44,12 @@ pub struct Settings {
     /// white noise of the drives, V rms per channel and control sample: angle random walk (gyroscope)
     #[serde(default)]
     pub force_noise_v: f64,
+    /// relative 1/f noise of the gain of either readout channel, density `gain_flicker`²/f (gyroscope)
+    #[serde(default)]
+    pub gain_flicker: f64,
+    /// relative 1/f noise of the table's rate, which `rate_dps` does not show, density `table_wander`²/f (gyroscope)
+    #[serde(default)]
+    pub table_wander: f64,
     /// control samples per second
     #[serde(default = "defaults::control_hz")]
     pub control_hz: f64,
