@@ -18,6 +18,8 @@ pub mod domain;
 pub mod envelope_loop;
 pub mod proof;
 pub mod scalar;
+#[cfg(feature = "recordings")]
+pub mod soak;
 pub mod tolerances;
 
 #[doc(no_inline)]

@@ -3,8 +3,10 @@
 use core::f64::consts::PI;
 
 use cvg_controller::{Allocation, Heading, OrbitCommands, PiState, RateLoop};
-use cvg_estimator::direction::major_axis;
-use cvg_estimator::{AngleState, LockState, PatternAngle, Period, PhaseLock, Status};
+use cvg_estimator::direction::{Direction, major_axis, major_axis_of};
+use cvg_estimator::{AngleState, LockState, PatternAngle, Period, PhaseLock, Precession, PrecessionState, Status};
+use cvg_instrument::{Instrument, Settings};
+use cvg_model::effects::EffectId;
 use cvg_model::{Envelope, Orbit, Pendulum, Real};
 use cvg_prover::{Exact, Proof, Refusal};
 use cvg_tests::domain::{envelope_patterns, envelopes, orbits, patterns, wrapped};
@@ -27,7 +29,71 @@ fn lock<T: Scalar>() -> PhaseLock<T> {
     PhaseLock::new(bandwidth, damping, period, limit).expect("inside its domain")
 }
 
+fn tracker<T: Scalar>() -> Precession<T> {
+    Precession::new(5e-4, 8e-3, 35.0, 0.1, 3e-4, 1e-9).expect("inside its domain")
+}
+
+/// The direction as the instrument finds it: by the tracker of the pattern's motion.
+fn flown<T: Scalar>(e: &Envelope<T>) -> Direction<T> {
+    let mut state = PrecessionState::default();
+    tracker().step(&mut state, &e.pendulum());
+    major_axis_of(e, state.cos_2, state.sin_2)
+}
+
 for_each_scalar! {
+    //= specs/electronics.md#direction-is-bounded
+    //= type=test
+    //# The components of the direction of the major axis MUST be finite and below two in magnitude for every input.
+    #[test]
+    fn prop_a_direction_of_any_bits_of_a_tracker_is_bounded(
+        e in envelope_patterns::<T>(), cos_2 in patterns::<T>(), sin_2 in patterns::<T>(),
+    ) {
+        let d = major_axis_of(&e, cos_2, sin_2);
+        prop_assert!(d.cos.to_f64().abs() < 2.0 && d.sin.to_f64().abs() < 2.0, "{d:?}");
+    }
+
+    //= specs/electronics.md#direction-is-a-unit-vector
+    //= type=test
+    //# The direction of the major axis MUST have the length one up to rounding.
+    //= specs/electronics.md#direction-of-equation-4
+    //= type=test
+    //# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
+    #[test]
+    fn prop_the_direction_that_the_drives_are_given_is_a_unit_vector_along_equation_4(o in orbits()) {
+        let (e, _) = rounded_envelope::<T>(&o.envelope());
+        let p = e.pendulum();
+        let d = flown(&e);
+        prop_assert_eq!(d.status, Status::Valid);
+        prop_assert_near!(d.cos.to_f64().hypot(d.sin.to_f64()), 1.0, T::tolerance(&DIRECTION));
+        let off = wrapped(d.angle().to_f64() - p.angle().to_f64(), PI);
+        let condition = p.e.to_f64() / p.r.to_f64().hypot(p.s.to_f64());
+        prop_assert_near!(off, 0.0, 2.0 * T::tolerance(&ANGLE) * condition);
+    }
+
+    //= specs/equation-04.md#unwrapping
+    //= type=test
+    //# The unwrapped angle MUST follow the pattern over any number of turns as long as it turns less than 90° from one sample to the next.
+    //= specs/dsp.md#unwrapping
+    //= type=test
+    //# The unwrapped angle MUST follow a turning pattern through any number of half turns without a jump.
+    #[test]
+    fn prop_the_angle_that_the_instrument_tells_follows_any_walk(
+        start in -1.57..1.57_f64, steps in prop::collection::vec(-1.56..1.56_f64, 1..60),
+    ) {
+        let (mut state, mut theta) = (PrecessionState::<T>::default(), start);
+        let mut see = |theta: f64| {
+            let (e, _) = rounded_envelope::<T>(&Orbit { a: 1.0, q: 0.0, theta, delta: 0.0 }.envelope());
+            tracker().step(&mut state, &e.pendulum());
+            state.degrees()
+        };
+        see(theta);
+        for step in steps {
+            theta += step;
+            let told = see(theta);
+            prop_assert_near!(told, theta.to_degrees(), 2e2 * T::tolerance(&ANGLE));
+        }
+    }
+
     //= specs/electronics.md#reading-within-its-period
     //= type=test
     //# The reading of the pattern angle MUST be finite and within half its period of zero for every input and every state.
@@ -224,6 +290,18 @@ fn a_drive_that_overflows_is_no_number_asked_for_too_much() {
     }
     let large = OrbitCommands { v_as: 1e6, v_qs: 0.0, v_qc: 0.0, v_ac: 0.0 };
     assert_eq!(allocation.step(&large, half, half).status, cvg_controller::Status::Limited);
+}
+
+//= specs/dsp.md#no-other-days-clock
+//= type=test
+//# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
+#[test]
+fn what_a_recordings_clock_told_is_not_compensated_on_another_day() {
+    for id in [EffectId::GainDrift, EffectId::TimePeriodic] {
+        let effects = [(id, id.neutral())];
+        let refused = Instrument::<f32>::new(&Settings { readout: &effects, ..Settings::default() });
+        assert_eq!(refused.expect_err("an effect in time").parameter, "readout", "{id:?}");
+    }
 }
 
 /// Why [`direction`] claims nothing on some paths.

@@ -181,6 +181,8 @@ typedef struct {
   bool clipped;
   // the last window had an envelope
   bool valid;
+  // half turns may be lost: the angle is right up to a multiple of 180 degrees; until cvg_acknowledge_half_turns
+  bool half_turns_lost;
 } cvg_output;
 
 // What was measured and commanded in the last control step.
@@ -239,6 +241,12 @@ cvg_output cvg_step(const cvg_instrument *instrument,
 // That of cvg_step.
 bool cvg_wish(cvg_state *state,
               uint8_t wish);
+
+// Takes back that half turns may be lost: whoever reads the angle has set it right, or does not need it.
+//
+// # Safety
+// That of cvg_step.
+void cvg_acknowledge_half_turns(cvg_state *state);
 
 // The unwrapped pattern angle at the middle of the last window, degrees; 0 without a state.
 //

@@ -189,6 +189,8 @@ pub struct Output {
     pub clipped: bool,
     /// the last window had an envelope
     pub valid: bool,
+    /// half turns may be lost: the angle is right up to a multiple of 180 degrees; until cvg_acknowledge_half_turns
+    pub half_turns_lost: bool,
 }
 
 /// What was measured and commanded in the last control step.
@@ -225,6 +227,7 @@ const NOTHING: Output = Output {
     fresh: false,
     clipped: false,
     valid: false,
+    half_turns_lost: true,
 };
 
 /// Settings for a device at 15.2 kHz with converters at 100 kHz, without compensation.
@@ -391,6 +394,7 @@ pub unsafe extern "C" fn cvg_step(
         fresh: status.fresh,
         clipped: status.clipped,
         valid: status.valid,
+        half_turns_lost: status.half_turns_lost,
     }
 }
 
@@ -437,6 +441,18 @@ pub unsafe extern "C" fn cvg_wish(state: *mut StateMemory, wish: u8) -> bool {
     let Some(wish) = wishes.get(usize::from(wish)) else { return false };
     state.wish(*wish);
     true
+}
+
+/// Takes back that half turns may be lost: whoever reads the angle has set it right, or does not need it.
+///
+/// # Safety
+/// That of cvg_step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cvg_acknowledge_half_turns(state: *mut StateMemory) {
+    // SAFETY: the caller's promise
+    if let Some(state) = unsafe { state.cast::<SingleState>().as_mut() } {
+        state.acknowledge_half_turns();
+    }
 }
 
 /// The unwrapped pattern angle at the middle of the last window, degrees; 0 without a state.

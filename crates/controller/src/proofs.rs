@@ -5,6 +5,7 @@
 //! assumption is either a "precondition:" of the function or a "budget:" of the solver.
 
 pub mod allocation;
+pub mod endings;
 pub mod pi;
 pub mod rate;
 pub mod supervisor;

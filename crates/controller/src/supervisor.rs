@@ -2,7 +2,10 @@
 //!
 //! From rest: listen whether anything vibrates (after a brown-out it does) → sweep the drive through the band, listen
 //! again → lock the phase → spin up → whole angle, or hold. A fault switches the drives off and keeps its name; after a
-//! rest the start is tried again, a few times.
+//! rest the start is tried again, a few times soon and then seldom.
+//!
+//! Nothing goes on for ever: a start has a budget of windows that only a fault or a time in operation renews, and what was
+//! out of bounds is forgotten only after a time in which nothing was.
 //!
 //! It refuses to measure and to compute forces: it takes one [`Observation`] a window and gives one [`Orders`]. Times are
 //! counted in windows, in integers, so that a mode lasts equally long in every precision.
@@ -10,6 +13,8 @@
 use cvg_model::{Float, Pendulum};
 
 use crate::ConfigError;
+
+mod step;
 
 /// What the instrument is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -145,7 +150,7 @@ pub struct SupervisorSettings {
     pub endure_s: f64,
     /// rest after a fault, s
     pub rest_s: f64,
-    /// starts after a fault before it stays
+    /// starts after a fault before the rests become [`LONG_REST`] times as long
     pub retries: u8,
     /// time in operation after which earlier faults are forgotten, s
     pub forget_s: f64,
@@ -170,6 +175,8 @@ pub struct Supervisor<T> {
     pub(crate) rest: u32,
     pub(crate) retries: u8,
     pub(crate) forget: u32,
+    /// windows of a start, all its modes together
+    pub(crate) budget: u32,
 }
 
 /// The supervisor's state: plain data, any content is admissible.
@@ -181,23 +188,25 @@ pub struct SupervisorState {
     pub fault: Option<Fault>,
     /// what the user wants
     pub wish: Wish,
-    /// windows in this mode
+    /// windows in this mode; in whole angle and hold, windows in a row in which all was well
     pub windows: u32,
     /// windows in a row in which the thing waited for was seen
     pub good: u32,
-    /// windows in which something was out of bounds, less those in which all was well
+    /// windows in which amplitude or quadrature was out of bounds, since all was well for a time
     pub bad: u32,
     /// windows in which a converter repeated itself, in a row
     pub repeats: u32,
-    /// windows with a clipped sample, less those without
+    /// windows with a clipped sample, since all was well for a time
     pub clipped: u32,
+    /// windows of this start that were neither operation nor fault: what is left of its budget shrinks with each
+    pub trying: u32,
     /// sweeps made in this start
     pub sweeps: u8,
-    /// starts made since all was well
+    /// starts made since all was well for long
     pub starts: u8,
     /// why it coasts, or did last in this start
     pub cause: Option<Fault>,
-    /// how often it coasted since all was well
+    /// how often it was interrupted, by a coast or a lost phase, since all was well for long
     pub coasts: u8,
 }
 
@@ -206,14 +215,16 @@ const ENOUGH: u32 = 20;
 /// Windows in a row in which a converter repeats itself to the last bit.
 const STUCK: u32 = 20;
 /// Short interruptions before they are a fault.
-const MOST_COASTS: u8 = 50;
+pub(crate) const MOST_COASTS: u8 = 50;
+/// By so much the rest grows when the starts of [`SupervisorSettings::retries`] are used up.
+pub const LONG_REST: u32 = 64;
 
 impl<T: Float> Supervisor<T> {
     /// A supervisor.
     ///
     /// # Errors
-    /// A setting that is not finite and positive, or a time of more than 2³¹ windows or of less than one;
-    /// `heard_v` not below a third of `amplitude_v`.
+    /// A setting that is not finite and positive, or a time of more than 2³¹ windows or of less than one; a lock or a spin-up
+    /// too short for what makes it; `heard_v` not below a third of `amplitude_v`.
     pub fn new(s: &SupervisorSettings) -> Result<Self, ConfigError> {
         let positive = [
             (s.window_s, "window_s"),
@@ -239,7 +250,12 @@ impl<T: Float> Supervisor<T> {
                 Err(ConfigError { parameter, expected: "at least a window and at most 2^31" })
             }
         };
-        Ok(Self {
+        for (time_s, parameter) in [(s.lock_s, "lock_s"), (s.spin_up_s, "spin_up_s")] {
+            if windows(time_s, parameter)? < ENOUGH + 2 {
+                return Err(ConfigError { parameter, expected: "at least 22 windows" });
+            }
+        }
+        let mut supervisor = Self {
             set_2: T::from_f64(s.amplitude_v * s.amplitude_v),
             low_2: T::from_f64(0.25 * s.amplitude_v * s.amplitude_v),
             high_2: T::from_f64(2.25 * s.amplitude_v * s.amplitude_v),
@@ -255,254 +271,23 @@ impl<T: Float> Supervisor<T> {
             rest: windows(s.rest_s, "rest_s")?,
             retries: s.retries,
             forget: windows(s.forget_s, "forget_s")?,
-        })
-    }
-
-    //= specs/dsp.md#start
-    //# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
-    //= specs/dsp.md#recovery
-    //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
-    /// The orders for the window to come, after the window `o`. Total.
-    pub fn step(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
-        state.count();
-        let running = matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.wish == Wish::of(state.mode);
-        let well = o.valid && !(o.clipped || o.repeats || o.jumped);
-        if running && well && self.within_bounds(&o.pendulum) {
-            state.bad = state.bad.saturating_sub(1);
-            state.repeats = 0;
-            state.clipped = state.clipped.saturating_sub(1);
-            if state.windows >= self.forget {
-                (state.starts, state.coasts, state.cause) = (0, 0, None);
-            }
-            return Orders::Run { hold: state.mode == Mode::Hold, ring_down: false };
-        }
-        if state.wish == Wish::Off {
-            *state = SupervisorState { wish: Wish::Off, fault: state.fault, ..SupervisorState::default() };
-            return Orders::Rest;
-        }
-        state.repeats = if o.repeats { state.repeats.saturating_add(1) } else { 0 };
-        state.clipped = if o.clipped { state.clipped.saturating_add(1) } else { state.clipped.saturating_sub(1) };
-        if state.mode == Mode::Fault {
-            return self.rest(state, o);
-        }
-        if state.repeats >= STUCK {
-            return fail(state, Fault::StuckChannel);
-        }
-        if state.clipped >= self.endure {
-            return fail(state, Fault::Saturated);
-        }
-        if !o.valid && state.mode != Mode::Coast {
-            return coast(state, Fault::InvalidSamples);
-        }
-        match state.mode {
-            Mode::Listen => self.listen(state, beat),
-            Mode::Sweep => self.sweep(state),
-            Mode::Lock => self.lock(state, o),
-            Mode::SpinUp => self.spin_up(state, o),
-            Mode::WholeAngle | Mode::Hold | Mode::RingDown => self.operate(state, o),
-            Mode::Coast => self.coast(state, o),
-            Mode::Fault => Orders::Rest,
-        }
-    }
-
-    /// Whether all that [`Supervisor::step`] does after a window with the pendulum variables `p`, of which nothing else is
-    /// amiss, is to [count](SupervisorState::count) it: whole angle or hold goes on as it is.
-    #[inline(always)]
-    pub fn goes_on(&self, state: &SupervisorState, p: &Pendulum<T>) -> bool {
-        let as_wished = match state.mode {
-            Mode::WholeAngle => state.wish == Wish::WholeAngle,
-            Mode::Hold => state.wish == Wish::Hold,
-            _ => false,
+            budget: 0,
         };
-        // one branch for all three
-        let counted = state.bad | state.repeats | state.clipped;
-        as_wished
-            && counted == 0
-            && (state.windows.saturating_add(1) < self.forget || state.forgotten())
-            && p.e > self.low_2
-            && p.e < self.high_2
-            // together below the bound that each has
-            && p.q.magnitude() + p.l.magnitude() < T::half() * p.e
+        supervisor.budget = supervisor.longest_start();
+        Ok(supervisor)
     }
 
-    /// Amplitude, quadrature and phase are those of an instrument in operation.
-    fn within_bounds(&self, p: &Pendulum<T>) -> bool {
-        let bound = T::half() * p.e;
-        p.e > self.low_2 && p.e < self.high_2 && p.q.magnitude() < bound && p.l.magnitude() < bound
+    /// Twice the windows of a start in which every mode takes its longest time once.
+    fn longest_start(&self) -> u32 {
+        let listening = u64::from(self.listen) * (u64::from(self.sweeps) + 1);
+        let sweeping: u64 = (0..self.sweeps).map(|n| u64::from(self.sweep_length(n))).sum();
+        let once = listening + sweeping + u64::from(self.lock) + u64::from(self.spin_up) + u64::from(self.coast);
+        u32::try_from(2 * once).unwrap_or(u32::MAX)
     }
 
-    fn listen(&self, state: &mut SupervisorState, beat: Option<Beat<T>>) -> Orders<T> {
-        if state.windows < self.listen {
-            return Orders::Listen;
-        }
-        let Some(beat) = beat else { return Orders::Listen };
-        let sum = beat.x2 + beat.y2;
-        let heard = sum > T::ratio(beat.windows, 1) * self.heard_2;
-        if heard {
-            let faint = sum * T::ratio(1, 400);
-            // a line along an axis looks like a dead channel, but not after a sweep that drives both
-            let suspicious = state.sweeps > 0 || state.fault == Some(Fault::DeadChannel);
-            if suspicious && (beat.x2 < faint || beat.y2 < faint) {
-                if state.sweeps >= self.sweeps {
-                    return fail(state, Fault::DeadChannel);
-                }
-                return enter(state, Mode::Sweep, Orders::Rest);
-            }
-            return enter(state, Mode::Lock, Orders::Tune);
-        }
-        if state.sweeps >= self.sweeps {
-            return fail(state, Fault::NoResonance);
-        }
-        enter(state, Mode::Sweep, Orders::Rest)
-    }
-
-    fn sweep(&self, state: &mut SupervisorState) -> Orders<T> {
-        let length = self.sweep.saturating_mul(1 << state.sweeps.min(8)).max(1);
-        if state.windows >= length {
-            state.sweeps = state.sweeps.saturating_add(1);
-            return enter(state, Mode::Listen, Orders::Rest);
-        }
-        let share = count::<T>(state.windows) / count::<T>(length);
-        Orders::Sweep {
-            correction_rad_s: self.band_rad_s * (T::two() * share - T::one()),
-            opposed: state.sweeps % 2 == 1,
-        }
-    }
-
-    fn lock(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
-        let p = &o.pendulum;
-        if p.e * T::ratio(4, 1) < self.heard_2 {
-            return enter(state, Mode::Listen, Orders::Rest);
-        }
-        if state.windows == 1 {
-            return Orders::Snap;
-        }
-        if p.l.magnitude() < T::ratio(1, 5) * p.e {
-            state.good = state.good.saturating_add(1);
-        } else {
-            state.good = 0;
-        }
-        if state.good >= ENOUGH {
-            return enter(state, Mode::SpinUp, Orders::Run { hold: false, ring_down: false });
-        }
-        if state.windows >= self.lock {
-            return fail(state, Fault::NoLock);
-        }
-        Orders::Lock
-    }
-
-    fn spin_up(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
-        let p = &o.pendulum;
-        if p.e * T::ratio(4, 1) < self.heard_2 {
-            return fail(state, Fault::AmplitudeLow);
-        }
-        let off = (p.e - self.set_2).magnitude();
-        if off < T::ratio(1, 5) * self.set_2 && p.q.magnitude() < T::ratio(1, 10) * p.e {
-            state.good = state.good.saturating_add(1);
-        } else {
-            state.good = 0;
-        }
-        if state.good >= ENOUGH {
-            state.sweeps = 0;
-            // a pattern that jumped onto an axis may be one channel that is left
-            if state.cause == Some(Fault::DeadChannel) && p.s.magnitude() < T::ratio(1, 30) * p.r.magnitude() {
-                return fail(state, Fault::DeadChannel);
-            }
-            let mode = match state.wish {
-                Wish::Hold => Mode::Hold,
-                Wish::RingDown => Mode::RingDown,
-                Wish::WholeAngle | Wish::Off => Mode::WholeAngle,
-            };
-            return enter(state, mode, orders(mode));
-        }
-        // on its way up an amplitude may be low
-        if let Some(orders) = self.out_of_bounds(state, p, false) {
-            return orders;
-        }
-        if state.windows >= self.spin_up {
-            return fail(state, Fault::NoSpinUp);
-        }
-        Orders::Run { hold: state.wish != Wish::WholeAngle, ring_down: false }
-    }
-
-    fn operate(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
-        let p = &o.pendulum;
-        if o.jumped {
-            return coast(state, Fault::DeadChannel);
-        }
-        if p.e * T::ratio(4, 1) < self.heard_2 {
-            return fail(state, Fault::AmplitudeLow);
-        }
-        let wished = match state.wish {
-            Wish::Hold => Mode::Hold,
-            Wish::RingDown => Mode::RingDown,
-            Wish::WholeAngle | Wish::Off => Mode::WholeAngle,
-        };
-        let low = p.e < self.low_2;
-        if wished != state.mode {
-            // after a ring-down the amplitude has to come back first
-            let next = if low { Mode::SpinUp } else { wished };
-            return enter(state, next, orders(next));
-        }
-        if let Some(orders) = self.out_of_bounds(state, p, low && state.mode != Mode::RingDown) {
-            return orders;
-        }
-        orders(state.mode)
-    }
-
-    /// What is to be done about a phase, an amplitude or a quadrature out of bounds.
-    fn out_of_bounds(&self, state: &mut SupervisorState, p: &Pendulum<T>, low: bool) -> Option<Orders<T>> {
-        let bound = T::half() * p.e;
-        if p.l.magnitude() >= bound {
-            return Some(enter(state, Mode::Lock, Orders::Snap));
-        }
-        let high = p.e > self.high_2;
-        let round = p.q.magnitude() >= bound;
-        if high || low || round {
-            state.bad = state.bad.saturating_add(1);
-            if state.bad >= self.endure {
-                let fault = match (high, low) {
-                    (true, _) => Fault::AmplitudeHigh,
-                    (_, true) => Fault::AmplitudeLow,
-                    _ => Fault::QuadratureHigh,
-                };
-                return Some(fail(state, fault));
-            }
-        } else {
-            state.bad = state.bad.saturating_sub(1);
-        }
-        None
-    }
-
-    fn coast(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
-        if !o.valid {
-            state.good = 0;
-            if state.windows >= self.coast {
-                let cause = state.cause.unwrap_or(Fault::InvalidSamples);
-                return fail(state, cause);
-            }
-            return Orders::Rest;
-        }
-        // two windows of a kind: what was in the middle of a window when it happened is past
-        state.good = state.good.saturating_add(1);
-        if state.good < 2 {
-            return Orders::Rest;
-        }
-        if o.pendulum.e * T::ratio(4, 1) < self.heard_2 {
-            return enter(state, Mode::Listen, Orders::Rest);
-        }
-        enter(state, Mode::Lock, Orders::Snap)
-    }
-
-    /// The rest after a fault.
-    fn rest(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
-        let cured = o.valid && state.repeats < STUCK;
-        if cured && state.windows >= self.rest && state.starts < self.retries {
-            state.starts = state.starts.saturating_add(1);
-            state.sweeps = 0;
-            return enter(state, Mode::Listen, Orders::Rest);
-        }
-        Orders::Rest
+    /// Windows of the sweep after `made` others: each takes twice as long as the last.
+    fn sweep_length(&self, made: u8) -> u32 {
+        self.sweep.saturating_mul(1 << made.min(8)).max(1)
     }
 }
 
@@ -516,7 +301,7 @@ impl SupervisorState {
     /// Nothing is left of earlier starts.
     #[inline(always)]
     fn forgotten(&self) -> bool {
-        self.starts | self.coasts == 0 && self.cause.is_none()
+        u32::from(self.starts | self.coasts) | self.trying == 0 && self.cause.is_none()
     }
 
     /// The fault it is in.
@@ -547,33 +332,4 @@ pub struct Beat<T> {
     pub y2: T,
     /// over how many windows
     pub windows: i32,
-}
-
-fn count<T: Float>(windows: u32) -> T {
-    T::ratio(i32::try_from(windows).unwrap_or(i32::MAX), 1)
-}
-
-fn orders<T>(mode: Mode) -> Orders<T> {
-    Orders::Run { hold: matches!(mode, Mode::Hold | Mode::RingDown), ring_down: mode == Mode::RingDown }
-}
-
-fn enter<T>(state: &mut SupervisorState, mode: Mode, orders: Orders<T>) -> Orders<T> {
-    (state.mode, state.windows, state.good, state.bad) = (mode, 0, 0, 0);
-    orders
-}
-
-fn coast<T>(state: &mut SupervisorState, cause: Fault) -> Orders<T> {
-    state.cause = Some(cause);
-    state.coasts = state.coasts.saturating_add(1);
-    if state.coasts > MOST_COASTS {
-        state.coasts = 0;
-        return fail(state, cause);
-    }
-    enter(state, Mode::Coast, Orders::Rest)
-}
-
-#[cold]
-fn fail<T>(state: &mut SupervisorState, fault: Fault) -> Orders<T> {
-    state.fault = Some(fault);
-    enter(state, Mode::Fault, Orders::Rest)
 }

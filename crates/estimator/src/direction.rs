@@ -58,6 +58,12 @@ pub fn major_axis<T: Float>(e: &Envelope<T>, p: &Pendulum<T>) -> Direction<T> {
     }
 }
 
+//= specs/electronics.md#direction-is-bounded
+//# The components of the direction of the major axis MUST be finite and below two in magnitude for every input.
+//= specs/electronics.md#direction-is-a-unit-vector
+//# The direction of the major axis MUST have the length one up to rounding.
+//= specs/electronics.md#direction-of-equation-4
+//# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
 /// [`major_axis`] from cos 2θ and sin 2θ, which a tracker of the pattern has already, for one square root:
 ///
 /// $$(\cos\theta, \sin\theta) = \pm\frac{(1+\cos 2\theta,\ \sin 2\theta)}{\sqrt{2(1+\cos 2\theta)}}\quad (\cos 2\theta\ge0),\qquad

@@ -92,6 +92,8 @@ impl<T: Float> Precession<T> {
         })
     }
 
+    //= specs/equation-04.md#unwrapping
+    //# The unwrapped angle MUST follow the pattern over any number of turns as long as it turns less than 90° from one sample to the next.
     //= specs/dsp.md#unwrapping
     //# The unwrapped angle MUST follow a turning pattern through any number of half turns without a jump.
     /// Follows the pattern to the window of the pendulum variables `p`. Total.
@@ -185,6 +187,11 @@ impl<T: Float> PrecessionState<T> {
     #[inline(always)]
     fn smoothed(&self, share: T, across: T) -> T {
         self.sin_2_per_window + share * (across - self.sin_2_per_window)
+    }
+
+    /// A direction is known: of the last window.
+    pub fn is_directed(&self) -> bool {
+        self.cos_2 != T::zero() || self.sin_2 != T::zero()
     }
 
     /// The unwrapped angle as half turns and the angle within (−90°, 90°], rad: **Equation 4** with its jumps counted.

@@ -2,7 +2,7 @@
 
 use approx::assert_abs_diff_eq;
 use cvg_estimator::direction::{major_axis, major_axis_of};
-use cvg_estimator::{AngleState, PatternAngle, Period, Status};
+use cvg_estimator::{AngleState, PatternAngle, Period, Reading, Status};
 use cvg_model::{Envelope, Orbit};
 use proptest::prelude::*;
 
@@ -212,5 +212,15 @@ proptest! {
         let e = Envelope::new(x_c, x_s, y_c, y_s);
         let direction = major_axis(&e, &e.pendulum());
         prop_assert!((direction.cos.hypot(direction.sin) - 1.0).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn degrees_are_those_of_the_reading_in_double_precision() {
+    for within_rad in [0.7_f32, -1.3, 1e-7] {
+        let reading = Reading { periods: 123_457, within_rad, status: Status::Valid };
+        let degrees = f64::from(within_rad).to_degrees();
+        assert_eq!(reading.degrees(Period::Pattern), 180.0 * 123_457.0 + degrees);
+        assert_eq!(reading.degrees(Period::FullTurn), 360.0 * 123_457.0 + degrees);
     }
 }

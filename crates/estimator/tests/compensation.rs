@@ -224,3 +224,25 @@ fn effects_are_kept_in_the_order_in_which_the_signal_meets_them() {
     let kept: Vec<_> = compensation.effects().map(|(id, _)| *id).collect();
     assert_eq!(kept, [EffectId::DetectionCubic, EffectId::DetectionOffset]);
 }
+
+#[test]
+fn a_readout_that_is_no_number_is_none_afterwards() {
+    let chains: [&[(EffectId, Values<f64>)]; 4] = [
+        &[],
+        &[(EffectId::DetectionGainMismatch, [1.25, 0.0, 0.0, 0.0]), (EffectId::DetectionOffset, [0.1, -0.3, 0.0, 0.0])],
+        &[(EffectId::DetectionCubic, [0.05, 0.01, 0.0, 0.0]), (EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0])],
+        &[(EffectId::AngleLatency, [0.01, 0.0, 0.0, 0.0])],
+    ];
+    for chain in chains {
+        let compensation = Compensation::<f64, 4>::new(chain).expect("valid");
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for k in 0..4 {
+                let mut parts = [0.6, -0.2, 0.5, 0.3];
+                parts[k] = value;
+                let [x_c, x_s, y_c, y_s] = parts;
+                let z = compensation.apply(Envelope::new(x_c, x_s, y_c, y_s), &Moment::default());
+                assert!(!z.pendulum().e.is_finite(), "{chain:?} {k} {value}: {z:?}");
+            }
+        }
+    }
+}

@@ -248,3 +248,21 @@ fn parameters_outside_their_domain_are_refused_by_name() {
         assert_eq!(new(&[(4, bad)]), Err("lead_s"), "{bad}");
     }
 }
+
+#[test]
+fn degrees_are_those_of_the_angle_in_double_precision() {
+    let state = PrecessionState { cos_2: 0.28_f32, sin_2: 0.96, half_turns: 1_000_001, ..PrecessionState::default() };
+    let (_, within) = state.angle();
+    assert_eq!(state.degrees(), 180.0 * 1_000_001.0 + f64::from(within).to_degrees());
+}
+
+#[test]
+fn half_turns_are_counted_as_far_as_they_can_be() {
+    for (half_turns, sense) in [(i32::MAX, 1.0), (i32::MIN, -1.0)] {
+        let mut state = PrecessionState { half_turns, ..PrecessionState::default() };
+        for theta in [1.5, 1.7] {
+            tracker().step(&mut state, &line(sense * theta));
+        }
+        assert_eq!(state.half_turns, half_turns);
+    }
+}

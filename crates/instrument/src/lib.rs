@@ -24,10 +24,12 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod continuity;
 pub mod settings;
 pub mod state;
 mod step;
 
+pub use continuity::Continuity;
 pub use cvg_controller::{Fault, Heading, Mode, Wish};
 pub use settings::{ConfigError, Settings, Tuning};
 pub use state::{Seen, State, Status};
@@ -51,6 +53,8 @@ pub struct Instrument<T> {
     rate: RateLoop<T>,
     allocation: Allocation<T>,
     supervisor: Supervisor<T>,
+    /// windows unseen in which a pattern at its fastest turns by 45 degrees
+    most_unseen: u32,
     energy_set_v2: T,
     /// volts on each channel in a sweep
     sweep_v: T,
@@ -59,7 +63,6 @@ pub struct Instrument<T> {
     delay_cos: T,
     delay_sin: T,
     delay_s: T,
-    window_s: T,
     per_window_s: T,
     hold: Heading<T>,
 }

@@ -1,6 +1,6 @@
 //! What an instrument is told of its device, its converters and its loops, and the check that it can be built so.
 
-use core::f64::consts::{PI, SQRT_2, TAU};
+use core::f64::consts::{FRAC_PI_4, PI, SQRT_2, TAU};
 
 use cvg_controller::{ActuationCompensation, Allocation, Heading, Pi, RateLoop, Supervisor, SupervisorSettings};
 use cvg_estimator::{Compensation, Demodulator, Oscillator, PhaseLock, Precession};
@@ -88,7 +88,8 @@ pub struct Settings<'a> {
     pub heard_v: f64,
     /// time of the first sweep, s
     pub sweep_s: f64,
-    /// readout effects that are undone
+    /// readout effects that are undone; not those that are told by the time of a recording: of its clock the electronics
+    /// know nothing
     pub readout: &'a [(EffectId, Values<f64>)],
     /// actuation effects that are undone
     pub actuation: &'a [(EffectId, Values<f64>)],
@@ -226,6 +227,11 @@ impl<T: Float> Instrument<T> {
         let hold_s = 0.5 * window_s;
         let lead_s = s.group_delay_s() + s.drive_delay_s + hold_s;
         let precession = Precession::new(window_s, 16.0 * window_s, s.fastest_rad_s, 0.1, lead_s, 0.2 * s.heard_v)?;
+        //= specs/dsp.md#no-other-days-clock
+        //# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
+        if s.readout.iter().any(|(id, _)| id.in_time()) {
+            return Err(ConfigError { parameter: "readout", expected: "free of what is told by a recording's clock" });
+        }
         let mut effects = [(EffectId::DetectionGainMismatch, [T::zero(); MAX_PARAMETERS]); MOST_COMPENSATED];
         let readout = converted(s.readout, &mut effects)?;
         let readout = if readout.is_empty() { None } else { Some(Compensation::new(readout)?) };
@@ -245,13 +251,13 @@ impl<T: Float> Instrument<T> {
             rate,
             allocation: Allocation::new(actuation, t(limit_v))?,
             supervisor: Supervisor::new(&s.supervisor())?,
+            most_unseen: most_unseen(s.fastest_rad_s * window_s),
             energy_set_v2: t(s.amplitude_v * s.amplitude_v),
             sweep_v: t(limit_v),
             dac_limit_v: t(s.dac_limit_v),
             delay_cos: t(delay_cos),
             delay_sin: t(delay_sin),
             delay_s: t(delay_s),
-            window_s: t(window_s),
             per_window_s: t(1.0 / window_s),
             hold: Heading::new(t(s.hold_rad))?,
         })
@@ -261,6 +267,13 @@ impl<T: Float> Instrument<T> {
     pub fn group_delay_samples(&self) -> f64 {
         self.demodulator.group_delay_samples()
     }
+}
+
+/// Windows in which a pattern that turns by `fastest_rad` in one does not turn by 45 degrees.
+fn most_unseen(fastest_rad: f64) -> u32 {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and NaN is 0")]
+    let windows = (FRAC_PI_4 / fastest_rad) as u32;
+    windows
 }
 
 /// The effects with values in this scalar.

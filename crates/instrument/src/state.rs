@@ -4,6 +4,8 @@ use cvg_controller::{Fault, Mode, PiState, SupervisorState, Wish};
 use cvg_estimator::{Beat, LockState, Phasor, PrecessionState, Window};
 use cvg_model::{AxisForces, Envelope, Float};
 
+use crate::Continuity;
+
 /// The instrument's state: plain data, any content is admissible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<T> {
@@ -31,6 +33,8 @@ pub struct State<T> {
     pub fingerprint: [T; 4],
     /// start-up, operation, faults
     pub supervisor: SupervisorState,
+    /// whether the count of half turns is still the pattern's
+    pub continuity: Continuity,
     /// control steps made
     pub windows: u32,
     /// what the last control step said; never `fresh` here
@@ -67,6 +71,9 @@ pub struct Status {
     pub clipped: bool,
     /// the last window had an envelope
     pub valid: bool,
+    /// half turns may be lost: the angle is right up to a multiple of 180 degrees; until
+    /// [`State::acknowledge_half_turns`]
+    pub half_turns_lost: bool,
 }
 
 impl<T: Float> Default for Seen<T> {
@@ -92,6 +99,12 @@ impl<T: Float> State<T> {
     /// The last fault, also after the instrument came back from it.
     pub fn last_fault(&self) -> Option<Fault> {
         self.supervisor.fault
+    }
+
+    /// Takes back that half turns may be lost: whoever reads the angle has set it right, or does not need it.
+    pub fn acknowledge_half_turns(&mut self) {
+        self.continuity.lost = false;
+        self.status.half_turns_lost = false;
     }
 
     /// The unwrapped pattern angle at the middle of the last window, in degrees.

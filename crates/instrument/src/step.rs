@@ -1,13 +1,14 @@
 //! The step: a sample, and every N samples the control step.
 
 use cvg_controller::supervisor::{self, Observation, Orders};
-use cvg_controller::{Mode, OrbitCommands, PiState, SupervisorState};
+use cvg_controller::{Mode, OrbitCommands, PiState, Supervisor, SupervisorState};
 use cvg_estimator::beat::phase_ahead;
 use cvg_estimator::direction::major_axis_of;
 use cvg_estimator::{Beat, Compensation, LockState, Movement, PrecessionState, Status as Measured, Window};
 use cvg_model::effects::Moment;
 use cvg_model::{AxisForces, ControlOutputs, Envelope, Float, Pendulum};
 
+use crate::continuity::{Continuity, Sight};
 use crate::{Instrument, MOST_COMPENSATED, Seen, State, Status};
 
 #[cfg(test)]
@@ -30,6 +31,7 @@ impl<T: Float> Instrument<T> {
             beat: Beat::default(),
             fingerprint: [T::zero(); 4],
             supervisor: SupervisorState::default(),
+            continuity: Continuity::default(),
             windows: 0,
             status: Status::default(),
         }
@@ -184,7 +186,14 @@ impl<T: Float> Instrument<T> {
         let phasor = self.oscillator.tune_within(&state.phasor, correction_rad_s)?;
 
         let drive = self.delayed(&forces, correction_rad_s);
-        let status = Status { mode: state.supervisor.mode, fault: None, fresh: false, clipped: false, valid: true };
+        let status = Status {
+            mode: state.supervisor.mode,
+            fault: None,
+            fresh: false,
+            clipped: false,
+            valid: true,
+            half_turns_lost: state.status.half_turns_lost,
+        };
         state.supervisor.count();
         (state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);
         if HOLD {
@@ -230,6 +239,15 @@ impl<T: Float> Instrument<T> {
         let pendulum = compensated.pendulum();
         // false where the compensation found no vibration behind the readout
         let valid = !spoilt && pendulum.e.is_finite();
+        let before = Sight {
+            valid,
+            clear: !(clipped || repeats),
+            movement: Movement::Unknown,
+            directed: state.precession.is_directed(),
+            in_phase: !(valid && in_operation(state.supervisor.mode)) || Supervisor::in_phase(&pendulum),
+            in_operation: false,
+            in_fault: false,
+        };
         let moved = if valid { self.precession.step(&mut state.precession, &pendulum) } else { Movement::Unknown };
         let observation = Observation { pendulum, valid, clipped, repeats, jumped: moved == Movement::Jumped };
         let beat = match state.supervisor.mode {
@@ -247,7 +265,11 @@ impl<T: Float> Instrument<T> {
         state.windows = state.windows.wrapping_add(1);
         state.phasor = self.oscillator.tune(&state.phasor, state.seen.correction_rad_s);
         state.window = Window::begin(&state.phasor);
-        Status { mode: state.supervisor.mode, fault: state.supervisor.fault_now(), fresh: false, clipped, valid }
+        let (mode, fault) = (state.supervisor.mode, state.supervisor.fault_now());
+        let sight =
+            Sight { movement: moved, in_operation: in_operation(mode), in_fault: mode == Mode::Fault, ..before };
+        state.continuity.see(sight, self.most_unseen);
+        Status { mode, fault, fresh: false, clipped, valid, half_turns_lost: state.continuity.lost }
     }
 
     /// Runs the loops that `orders` ask for, and sets the drives and the oscillator.
@@ -343,9 +365,9 @@ impl<T: Float> Instrument<T> {
     /// The moment of the window, for readout effects that depend on it.
     #[inline]
     fn moment(&self, state: &State<T>) -> Moment<T> {
-        let windows = T::ratio(i32::try_from(state.windows).unwrap_or(i32::MAX), 1);
         Moment {
-            t_s: windows * self.window_s,
+            // effects that are told by it are refused
+            t_s: T::zero(),
             table_rad: T::zero(),
             precession_rad_s: self.precession.rate_rad_s(&state.precession),
         }
@@ -361,6 +383,10 @@ struct Suspicion {
     clipped: bool,
     /// a channel repeats the last window
     repeats: bool,
+}
+
+fn in_operation(mode: Mode) -> bool {
+    matches!(mode, Mode::WholeAngle | Mode::Hold | Mode::RingDown)
 }
 
 /// A channel's samples are those of the last window, to the last bit, and not all nothing.

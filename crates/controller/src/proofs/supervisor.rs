@@ -6,7 +6,7 @@ use kani::Arbitrary;
 use crate::supervisor::{Beat, Fault, Mode, Observation, Orders, Supervisor, SupervisorState, Wish};
 
 /// Any supervisor, also such as `new` would refuse.
-fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
+pub(super) fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
     Supervisor {
         set_2: kani::any(),
         low_2: kani::any(),
@@ -23,6 +23,7 @@ fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
         rest: kani::any(),
         retries: kani::any(),
         forget: kani::any(),
+        budget: kani::any(),
     }
 }
 
@@ -42,7 +43,7 @@ fn any_fault() -> Option<Fault> {
     }
 }
 
-fn any_state() -> SupervisorState {
+pub(super) fn any_state() -> SupervisorState {
     SupervisorState {
         mode: match kani::any::<u8>() % 9 {
             0 => Mode::Listen,
@@ -67,6 +68,7 @@ fn any_state() -> SupervisorState {
         bad: kani::any(),
         repeats: kani::any(),
         clipped: kani::any(),
+        trying: kani::any(),
         sweeps: kani::any(),
         starts: kani::any(),
         cause: any_fault(),
@@ -74,7 +76,7 @@ fn any_state() -> SupervisorState {
     }
 }
 
-fn any_observation<T: Float + Arbitrary>() -> Observation<T> {
+pub(super) fn any_observation<T: Float + Arbitrary>() -> Observation<T> {
     Observation {
         pendulum: Pendulum { e: kani::any(), q: kani::any(), r: kani::any(), s: kani::any(), l: kani::any() },
         valid: kani::any(),
@@ -84,7 +86,7 @@ fn any_observation<T: Float + Arbitrary>() -> Observation<T> {
     }
 }
 
-fn any_beat<T: Float + Arbitrary>() -> Option<Beat<T>> {
+pub(super) fn any_beat<T: Float + Arbitrary>() -> Option<Beat<T>> {
     let beat = Beat { x2: kani::any(), y2: kani::any(), windows: kani::any() };
     if kani::any() { Some(beat) } else { None }
 }

@@ -32,6 +32,39 @@ fn the_fifty_first_interruption_is_a_fault() {
 }
 
 #[test]
+fn the_fifty_first_lost_phase_is_a_fault() {
+    let lost = with(|p| p.l = 12.5);
+    for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+        let before = |coasts| SupervisorState { coasts, cause: Some(Fault::DeadChannel), ..in_mode(mode, 2) };
+        let (after, orders) = step(before(49), &lost);
+        assert_eq!((after.mode, after.coasts, orders), (Mode::Lock, 50, Orders::Snap));
+        assert_eq!(after.cause, Some(Fault::DeadChannel), "why it coasted is another matter");
+        assert_eq!(becomes(before(50), &lost), fault(Fault::NoLock));
+    }
+}
+
+#[test]
+fn a_converter_at_its_end_and_one_that_repeats_itself_are_named_as_what_they_are() {
+    let silent = |clipped, repeats| Observation { clipped, repeats, ..energy(0.0) };
+    let jumped = |clipped, repeats| Observation { clipped, repeats, jumped: true, ..well() };
+    for (clipped, repeats, low, dead) in [
+        (false, false, Fault::AmplitudeLow, Fault::DeadChannel),
+        (false, true, Fault::StuckChannel, Fault::StuckChannel),
+        (true, false, Fault::Saturated, Fault::Saturated),
+        (true, true, Fault::Saturated, Fault::Saturated),
+    ] {
+        for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
+            assert_eq!(becomes(in_mode(mode, 3), &silent(clipped, repeats)), fault(low), "{mode:?}");
+        }
+        let (after, _) = step(in_mode(Mode::WholeAngle, 3), &jumped(clipped, repeats));
+        assert_eq!((after.mode, after.cause), (Mode::Coast, Some(dead)));
+    }
+    let railed = Observation { clipped: true, repeats: true, ..well() };
+    let before = SupervisorState { repeats: IN_A_ROW - 1, ..in_mode(Mode::WholeAngle, 1) };
+    assert_eq!(becomes(before, &railed), fault(Fault::Saturated));
+}
+
+#[test]
 fn two_windows_in_a_row_end_a_coast_in_a_lock_or_in_listening() {
     let (one, orders) = step(in_mode(Mode::Coast, 2), &well());
     assert_eq!((one.mode, one.good, orders), (Mode::Coast, 1, Orders::Rest));
@@ -70,12 +103,12 @@ fn a_converter_at_the_end_of_its_range_is_endured_for_its_time() {
         let (after, _) = step(before(ENDURE - 2), &clipped);
         assert_eq!((after.fault_now(), after.clipped), (None, ENDURE - 1));
         assert_eq!(becomes(before(ENDURE - 1), &clipped), fault(Fault::Saturated));
-        assert_eq!(step(before(ENDURE - 1), &well()).0.clipped, ENDURE - 2);
+        assert_eq!(step(before(ENDURE - 2), &well()).0.clipped, ENDURE - 2, "{mode:?}");
     }
 }
 
 #[test]
-fn after_a_rest_the_start_is_tried_again_as_often_as_is_set() {
+fn after_a_rest_the_start_is_tried_again_as_often_as_is_set_and_then_after_long_rests() {
     let fallen = |starts, windows| SupervisorState {
         starts,
         sweeps: 3,
@@ -88,8 +121,18 @@ fn after_a_rest_the_start_is_tried_again_as_often_as_is_set() {
         assert_eq!((after.mode, after.starts, after.sweeps, orders), (Mode::Listen, starts + 1, 0, Orders::Rest));
         assert_eq!((after.fault, after.fault_now()), (Some(Fault::NoLock), None), "it is remembered, not in force");
     }
-    assert_eq!(becomes(fallen(2, REST - 1), &well()), fault(Fault::NoLock));
+    let long = LONG_REST * REST;
+    assert_eq!(becomes(fallen(2, long - 2), &well()), fault(Fault::NoLock));
+    let (after, orders) = step(fallen(2, long - 1), &well());
+    assert_eq!((after.mode, after.starts, orders), (Mode::Listen, 2, Orders::Rest));
     assert_eq!(becomes(fallen(0, REST + 7), &invalid()), fault(Fault::NoLock), "not without a measurement");
+    let clipped = Observation { clipped: true, ..well() };
+    assert_eq!(becomes(fallen(0, REST + 7), &clipped), fault(Fault::NoLock), "not at the end of a converter's range");
+    // a start is given all that it may use
+    let cause = Some(Fault::DeadChannel);
+    let used = SupervisorState { trying: 77, clipped: ENDURE - 1, cause, ..fallen(0, REST - 1) };
+    let (after, _) = step(used, &well());
+    assert_eq!((after.mode, after.trying, after.clipped, after.cause), (Mode::Listen, 0, 0, None));
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! The supervisor window by window: what each mode orders, what ends it, after exactly how many windows, and on which
 //! side of each bound the bound itself lies. Here are the instrument and the windows of which the tests speak.
 
+mod endings;
 mod interruptions;
 mod operation;
 mod settings;
 mod start;
 
-use cvg_controller::supervisor::{Beat, Observation, Orders};
+use cvg_controller::supervisor::{Beat, LONG_REST, Observation, Orders};
 use cvg_controller::{Fault, Mode, Supervisor, SupervisorSettings, SupervisorState, Wish};
 use cvg_model::Pendulum;
 

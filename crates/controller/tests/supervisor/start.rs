@@ -55,6 +55,9 @@ fn a_channel_with_less_than_a_400th_of_the_power_is_dead_after_a_sweep_or_a_dead
 
 #[test]
 fn a_sweep_crosses_the_band_evenly_each_twice_as_long_as_the_last_and_every_second_opposed() {
+    // with a budget for the longest of them
+    let patient = SupervisorSettings { spin_up_s: 1e4 * WINDOW_S, ..settings() };
+    let supervisor = || Supervisor::<f64>::new(&patient).expect("valid");
     for (sweeps, length) in [(0, 4), (1, 8), (2, 16), (3, 32), (8, 1024), (12, 1024)] {
         let mut state = SupervisorState { sweeps, ..in_mode(Mode::Sweep, 0) };
         for k in 1..length {

@@ -16,7 +16,7 @@ const READOUTS: [&[(EffectId, Values<f64>)]; 4] = [
     &[],
     &[(EffectId::DetectionGainMismatch, [1.0132, 0.0, 0.0, 0.0]), (EffectId::DetectionCubic, [0.004, 0.0, 0.0, 0.0])],
     &[(EffectId::DetectionCubic, [0.08, 0.01, 0.0, 0.0]), (EffectId::DetectionOffset, [0.01, -0.02, 0.0, 0.0])],
-    &[(EffectId::GainDrift, [1e-4, 0.0, 0.0, 0.0]), (EffectId::DetectionSkew, [0.02, 0.0, 0.0, 0.0])],
+    &[(EffectId::AngleLatency, [1e-3, 0.0, 0.0, 0.0]), (EffectId::DetectionSkew, [0.02, 0.0, 0.0, 0.0])],
 ];
 const ACTUATIONS: [&[(EffectId, Values<f64>)]; 2] =
     [&[], &[(EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0])]];
@@ -37,6 +37,8 @@ struct Case {
     counts: [u32; 5],
     /// a converter repeats itself
     repeats: bool,
+    /// half turns may be lost
+    lost: bool,
 }
 
 fn instrument<T: Float>(case: &Case) -> Instrument<T> {
@@ -54,6 +56,8 @@ fn prepared<T: Float>(i: &Instrument<T>, case: &Case) -> (State<T>, [T; 4]) {
     (state.supervisor.windows, state.supervisor.bad) = (windows, bad);
     (state.supervisor.repeats, state.supervisor.clipped) = (repeats, clipped);
     state.supervisor.starts = u8::try_from(starts).expect("few");
+    state.continuity = Continuity { unseen: 0, counting: true, lost: case.lost };
+    state.status.half_turns_lost = case.lost;
     let [energy, quadrature, rate, detuning] = case.integrals.map(t);
     (state.energy.integral, state.quadrature.integral, state.rate.integral) = (energy, quadrature, rate);
     state.lock.detuning_rad_s = detuning;
@@ -121,6 +125,7 @@ fn calm(theta: f64) -> Case {
         integrals: [-0.01, 0.001, 0.0, 3.0],
         counts: [1000, 0, 0, 0, 0],
         repeats: false,
+        lost: false,
     }
 }
 
@@ -149,9 +154,10 @@ prop_compose! {
             1 => prop::array::uniform5(0_u32..255).prop_map(|c| [19_900 + c[0], c[1] / 200, c[2] / 200, c[3] / 200, c[4] % 3]),
         ],
         repeats in prop::bool::weighted(0.05),
+        lost: bool,
     ) -> Case {
         let orbit = Orbit { a, q: round * a, theta, delta };
-        Case { settings, mode, orbit, phase, turned, integrals, counts, repeats }
+        Case { settings, mode, orbit, phase, turned, integrals, counts, repeats, lost }
     }
 }
 

@@ -23,6 +23,8 @@ impl Effect for GainDrift {
         source: "temperature of the readout electronics",
     };
 
+    const IN_TIME: bool = true;
+
     #[inline]
     fn read<T: Real>(&[drift, ..]: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
         DetectionGains { x: T::one(), y: T::one() + drift * at.t_s }.measure(&e)

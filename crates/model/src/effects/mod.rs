@@ -204,6 +204,9 @@ pub trait Effect {
     /// What is known of it.
     const DESCRIPTION: Description;
 
+    /// It is told by the time of a recording's clock, which says nothing of another day.
+    const IN_TIME: bool = false;
+
     /// Input rate that reaches the resonator, rad/s, when the table turns at `rate_rad_s`.
     #[inline]
     fn input_rate<T: Real>(_: &Values<T>, rate_rad_s: T, _: &Moment<T>) -> T {
@@ -285,6 +288,11 @@ macro_rules! library {
             /// What is known of it.
             pub const fn description(self) -> &'static Description {
                 match self { $(Self::$name => const { &<$effect as Effect>::DESCRIPTION }),+ }
+            }
+
+            /// [`Effect::IN_TIME`]
+            pub const fn in_time(self) -> bool {
+                match self { $(Self::$name => const { <$effect as Effect>::IN_TIME }),+ }
             }
 
             /// [`Effect::input_rate`]

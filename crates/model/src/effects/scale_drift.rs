@@ -22,6 +22,8 @@ impl Effect for ScaleDrift {
         source: "temperature of the resonator",
     };
 
+    const IN_TIME: bool = true;
+
     #[inline]
     fn input_rate<T: Real>(&[drift, ..]: &Values<T>, rate_rad_s: T, at: &Moment<T>) -> T {
         rate_rad_s * (T::one() + drift * at.t_s)

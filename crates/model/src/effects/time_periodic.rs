@@ -30,6 +30,8 @@ impl Effect for TimePeriodic {
         source: "mains, a fan, another resonance",
     };
 
+    const IN_TIME: bool = true;
+
     #[inline]
     fn read<T: Real>(p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
         let (sin, cos) = disturbance(p, at).sin_cos();

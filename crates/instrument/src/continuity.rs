@@ -1,0 +1,54 @@
+//! Whether the count of half turns is still that of the pattern.
+//!
+//! A pattern's direction has a period of 180 degrees: the count is right as long as no window was missed in which the
+//! pattern may have turned by 45 degrees, and no window showed another direction than that of a pattern that turns.
+
+use cvg_estimator::Movement;
+
+/// What is known of the count: plain data, any content is admissible.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Continuity {
+    /// windows in a row that did not show the pattern
+    pub unseen: u32,
+    /// the pattern was in operation: the count means something
+    pub counting: bool,
+    /// half turns may be lost, since it was acknowledged last
+    pub lost: bool,
+}
+
+/// What a window was to whoever counts half turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sight {
+    /// it has an envelope
+    pub(crate) valid: bool,
+    /// of converters within their range that do not repeat themselves
+    pub(crate) clear: bool,
+    /// how the direction moved
+    pub(crate) movement: Movement,
+    /// there was a direction before
+    pub(crate) directed: bool,
+    /// in operation the phase is near
+    pub(crate) in_phase: bool,
+    /// the instrument is in operation after this window
+    pub(crate) in_operation: bool,
+    /// it is in a fault
+    pub(crate) in_fault: bool,
+}
+
+impl Continuity {
+    //= specs/dsp.md#half-turns
+    //# Half turns that may be lost MUST be said to be until it is acknowledged.
+    /// Takes note of a window; `most_unseen` windows are too few for 45 degrees.
+    pub(crate) fn see(&mut self, sight: Sight, most_unseen: u32) {
+        self.unseen = if sight.valid && sight.clear { 0 } else { self.unseen.saturating_add(1) };
+        // a direction from nowhere, or none any more
+        let interrupted = sight.valid && sight.movement == Movement::Unknown && sight.directed;
+        let doubtful = sight.movement == Movement::Jumped
+            || interrupted
+            || !sight.in_phase
+            || sight.in_fault
+            || self.unseen > most_unseen;
+        self.lost |= self.counting && doubtful;
+        self.counting |= sight.in_operation;
+    }
+}

@@ -1,0 +1,133 @@
+//! What is commanded: where, in which phase and how much.
+
+use core::f64::consts::PI;
+
+use cvg_instrument::{Mode, Settings, Wish};
+use cvg_model::Float;
+
+use super::Bench;
+
+/// The force over a window, as amplitudes along and across the pattern and in phase with it and in quadrature, V: at the
+/// moments when the outputs act. The last is what is left beside the four.
+fn force<T: Float>(bench: &mut Bench<T>) -> [f64; 4] {
+    let s = bench.settings;
+    // the middle of the output's hold
+    let later = s.drive_delay_s + 0.5 / s.sample_hz;
+    let mut sums = [0.0; 4];
+    let count = 50 * u32::from(s.window);
+    for _ in 0..count {
+        let taken = bench.time_s();
+        bench.sample_through(|v| v);
+        let (sin, cos) = bench.theta(taken + later).sin_cos();
+        let (quadrature, phase) = bench.phase(taken + later).sin_cos();
+        let [x, y] = bench.out;
+        let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+        for (sum, v) in sums.iter_mut().zip([along * phase, along * quadrature, across * phase, across * quadrature]) {
+            *sum += 2.0 * v / f64::from(count);
+        }
+    }
+    sums
+}
+
+fn energy_acts_along_the_pattern<T: Float>() {
+    // in each quadrant, on an axis and exactly at 135 degrees
+    for theta in [0.0, 0.4, PI / 4.0, 1.2, PI / 2.0, 2.0, 0.75 * PI, 2.8, -0.4, -PI / 4.0, -1.2, -2.8] {
+        for rate in [0.0, 5.0, -5.0] {
+            let mut bench = Bench::<T>::running(theta, rate);
+            bench.state.energy = cvg_controller::PiState::default();
+            bench.amplitude_v = 1.02;
+            bench.windows(20);
+            let before = bench.state.seen.v_as.to_f64();
+            let [along_c, along_s, across_c, across_s] = force(&mut bench);
+            let v_as = 0.5 * (before + bench.state.seen.v_as.to_f64());
+            // too large: taken out, along the pattern and in quadrature
+            assert!(v_as > 0.3, "{v_as}");
+            assert!((along_s.abs() - v_as).abs() < 0.02 * v_as, "{theta} {rate}: {along_s} and {v_as} V");
+            // 0.2 degrees of phase and of direction
+            for left in [along_c, across_c, across_s] {
+                assert!(left.abs() < 4e-3 * v_as, "{theta} {rate}: {along_c} {across_c} {across_s} of {v_as} V");
+            }
+        }
+    }
+}
+
+fn what_is_commanded_is_what_acts<T: Float>() {
+    for theta in [0.3, 1.9, -0.3, -1.9] {
+        let mut bench = Bench::<T>::running(theta, 0.0);
+        bench.windows(1);
+        let set = bench.instrument;
+        // a command of the quadrature loop: across, in phase
+        bench.state.energy = cvg_controller::PiState::default();
+        bench.state.quadrature.integral = T::ratio(1, 10);
+        bench.windows(1);
+        let [along_c, along_s, across_c, across_s] = force(&mut bench);
+        let v_qc = bench.state.seen.v_qc.to_f64();
+        assert!(v_qc.abs() > 0.05 && set == bench.instrument, "{v_qc}");
+        assert!((across_c.abs() - v_qc.abs()).abs() < 0.05 * v_qc.abs(), "{across_c} and {v_qc}");
+        assert!(across_c.signum() == -along_s.signum() * v_qc.signum() || along_s.abs() < 1e-2, "{across_c} {along_s}");
+        assert!(along_c.abs() < 0.01 * v_qc.abs() && across_s.abs() < 0.01 * v_qc.abs(), "{along_c} {across_s}");
+    }
+}
+
+fn a_hold_integrates<T: Float>() {
+    for (theta, sense) in [(0.01, 1.0), (-0.01, -1.0)] {
+        let mut bench = Bench::<T>::with(Settings::default());
+        bench.state.wish(Wish::Hold);
+        bench.start(theta, 0.0);
+        assert_eq!(bench.status.mode, Mode::Hold);
+        let first = bench.state.seen.v_qs.to_f64();
+        bench.windows(200);
+        let second = bench.state.seen.v_qs.to_f64();
+        bench.windows(200);
+        let third = bench.state.seen.v_qs.to_f64();
+        assert!(first * sense > 0.0, "{first}");
+        // K/2τ·ε a second, 0.1 s apart
+        let (more, again) = (second - first, third - second);
+        assert!(more * sense > 0.0 && (again / more - 1.0).abs() < 0.05, "{first} {second} {third}");
+    }
+}
+
+fn a_detuning_is_found<T: Float>() {
+    for off_hz in [40.0, -40.0] {
+        let mut settings = Settings::default();
+        settings.carrier_hz += off_hz;
+        let mut bench = Bench::<T>::with(Settings::default());
+        bench.settings = settings;
+        bench.start(0.4, 0.0);
+        bench.windows(400);
+        let found = bench.state.seen.correction_rad_s.to_f64() / (2.0 * PI);
+        assert!((found - off_hz).abs() < 0.05, "{found} Hz");
+        let kept = bench.state.lock.detuning_rad_s.to_f64() / (2.0 * PI);
+        assert!((kept - off_hz).abs() < 0.05, "{kept} Hz");
+        let [along_c, along_s, ..] = {
+            bench.state.energy = cvg_controller::PiState::default();
+            bench.amplitude_v = 1.02;
+            bench.windows(20);
+            force(&mut bench)
+        };
+        // the phase of the drive knows the detuning
+        assert!(along_c.abs() < 4e-3 * along_s.abs(), "{along_c} {along_s}");
+    }
+}
+
+in_both_precisions! {
+    the_energy_loop_acts_along_the_pattern_and_in_quadrature energy_acts_along_the_pattern;
+    the_quadrature_loop_acts_across_the_pattern_and_in_phase what_is_commanded_is_what_acts;
+    a_pattern_beside_its_heading_is_pushed_more_and_more a_hold_integrates;
+    a_resonance_beside_its_nominal_frequency_is_found a_detuning_is_found;
+}
+
+#[test]
+fn outputs_have_their_limit_on_both_channels() {
+    for theta in [0.0, PI / 2.0] {
+        let mut bench = Bench::<f32>::running(theta, 0.0);
+        bench.state.drive.x_s = 1e9;
+        bench.state.drive.y_s = -1e9;
+        let mut most = [0.0_f64; 2];
+        for _ in 0..40 {
+            bench.sample_through(|v| v);
+            most = [0, 1].map(|k| most[k].max(bench.out[k].abs()));
+        }
+        assert_eq!(most, [10.0; 2]);
+    }
+}

@@ -1,0 +1,84 @@
+//! Half turns: counted while they are seen, and doubted, aloud, when they may not have been.
+
+use cvg_instrument::{Continuity, Mode, Wish};
+use cvg_model::Float;
+
+use super::Bench;
+
+fn unseen_turns_are_doubted<T: Float>() {
+    // a pattern that turns by half a turn in a gap, and a whole number of the carrier's periods and of half turns later
+    for rate in [20.0, -20.0] {
+        let mut bench = Bench::<T>::running(0.2, rate);
+        // 0.157 s: half a turn, and 2387.6 periods
+        bench.unseen(15_708);
+        bench.windows(300);
+        assert!(bench.status.half_turns_lost, "{rate}");
+        // until it is acknowledged, and no longer
+        bench.windows(300);
+        assert!(bench.status.half_turns_lost && bench.status.mode == Mode::WholeAngle);
+        bench.state.acknowledge_half_turns();
+        assert!(!bench.state.status.half_turns_lost);
+        bench.windows(300);
+        assert!(!bench.status.half_turns_lost, "{:?}", bench.state.continuity);
+    }
+}
+
+fn a_phase_that_jumps_is_doubted<T: Float>() {
+    // by 3 degrees the loops go on, and yet nobody knows how long nobody looked
+    for jump in [0.06, -0.06] {
+        let mut bench = Bench::<T>::running(0.2, 0.0);
+        bench.phase_rad += jump;
+        bench.windows(2);
+        assert!(bench.status.half_turns_lost && bench.status.mode == Mode::WholeAngle, "{:?}", bench.state.supervisor);
+    }
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.phase_rad += 0.01;
+    bench.windows(200);
+    assert!(!bench.status.half_turns_lost);
+}
+
+fn too_long_without_a_window_is_doubted<T: Float>() {
+    // at 35 rad/s 45 degrees are 44 windows
+    for (windows, doubted) in [(40, false), (44, false), (45, true), (60, true)] {
+        let mut bench = Bench::<T>::running(0.2, 1.0);
+        bench.windows_through(windows, |_| [f64::NAN; 2]);
+        assert_eq!(bench.state.continuity.lost, doubted, "{windows} windows");
+        bench.windows(300);
+        assert_eq!(bench.status.half_turns_lost, doubted, "{windows} windows");
+        assert_eq!(bench.status.mode, Mode::WholeAngle);
+    }
+}
+
+fn a_jump_and_a_fault_are_doubted<T: Float>() {
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.theta_rad += 0.5;
+    bench.windows(3);
+    assert!(bench.status.half_turns_lost, "a jump");
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.amplitude_v = 0.001;
+    bench.windows(3);
+    assert!(bench.status.half_turns_lost, "silence");
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.amplitude_v = 2.0;
+    assert!(bench.fault(1000, |v| v).is_some() && bench.status.half_turns_lost, "a fault");
+}
+
+fn a_start_is_no_loss<T: Float>() {
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    assert_eq!(bench.state.continuity, Continuity { unseen: 0, counting: true, lost: false });
+    // a wish for another mode neither
+    bench.state.wish(Wish::Hold);
+    bench.windows(10);
+    assert!(bench.status.mode == Mode::Hold && !bench.status.half_turns_lost);
+    bench.phase_rad += 0.06;
+    bench.windows(2);
+    assert!(bench.status.half_turns_lost, "in a hold too");
+}
+
+in_both_precisions! {
+    turns_that_nobody_saw_are_doubted_until_it_is_acknowledged unseen_turns_are_doubted;
+    a_phase_that_is_not_where_it_was_left_is_doubted a_phase_that_jumps_is_doubted;
+    as_many_windows_as_a_pattern_needs_for_45_degrees_are_doubted too_long_without_a_window_is_doubted;
+    a_pattern_that_jumps_and_one_that_falls_silent_are_doubted a_jump_and_a_fault_are_doubted;
+    a_start_and_another_wish_lose_nothing a_start_is_no_loss;
+}
