@@ -3,6 +3,7 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Shown};
 use nalgebra::DMatrix;
 
+use crate::angle_sensor;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::picture::{Picture, Scene};
 use crate::diagnostics::residual::{
@@ -106,6 +107,9 @@ pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Resul
 }
 
 fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+    if angle_sensor::serves(&campaign) {
+        return angle_sensor::identify(campaign, options, pictured);
+    }
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
     let inputs = provenance::inputs(&campaign);
@@ -264,7 +268,7 @@ fn undescribed(bench: &Bench, fit: &Fit) -> f64 {
     (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
 }
 
-fn run_report(run: &crate::recording::Run) -> RunReport {
+pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {
     let d = &run.recording.dropped;
     RunReport {
         file: run.file.display().to_string(),

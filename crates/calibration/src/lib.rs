@@ -33,6 +33,7 @@
 //! This crate knows nothing of the simulator, and renders nothing.
 #![forbid(unsafe_code)]
 
+mod angle_sensor;
 mod data;
 mod diagnostics;
 mod error;
@@ -50,7 +51,8 @@ pub use error::{Cause, Refusal};
 pub use estimation::joint_fit::belief;
 pub use estimation::{actuation, bias, identifiability};
 pub use identification::{BiasCurve, Figures, Identification, Options, identify, identify_with_picture};
-pub use model::hypothesis::{Hypothesis, Member, Origin, Unknown};
+pub use model::angle_table::{AngleTable, Form};
+pub use model::hypothesis::{ChannelClip, Hypothesis, Member, Origin, Unknown};
 pub use report::calibration;
 pub use report::compensate::compensate;
 pub use selection::discovery;

@@ -26,7 +26,7 @@ mod unknown;
 
 use std::path::PathBuf;
 
-pub use campaign::{Campaign, Instrument, Role, Run, RunKind};
+pub use campaign::{Campaign, Instrument, Reference, Role, Run, RunKind};
 pub use channel::Channel;
 pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};

@@ -12,6 +12,9 @@ use crate::recording::Role;
 /// Residuals further out than this many robust deviations are spikes.
 const SPIKE: f64 = 6.0;
 
+/// Samples in a row that a spike may last.
+const LONGEST_SPIKE: usize = 2;
+
 /// Size of an angle error, deg.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ErrorSize {
@@ -50,10 +53,7 @@ pub(crate) fn evaluate(
         }
     }
     let Some(like) = like else { return Evaluation::of(segments) };
-    for (s, keep) in segments.iter_mut().zip(&like.kept) {
-        take_line(s, keep);
-    }
-    Evaluation { segments, kept: like.kept.clone() }
+    Evaluation::of_segments(segments, Some(like))
 }
 
 /// Takes the best line out of a segment, and its spikes out of the line; says what is left of it.
@@ -68,6 +68,18 @@ fn straightened(s: &mut Residual) -> Vec<bool> {
     }
     take_line(s, &keep);
     keep
+}
+
+/// Keeps what is far off for more than two samples in a row.
+fn only_short_spikes(mut kept: Vec<bool>) -> Vec<bool> {
+    let mut from = 0;
+    for run in kept.clone().chunk_by(|a, b| a == b) {
+        if run.len() > LONGEST_SPIKE {
+            kept[from..from + run.len()].fill(true);
+        }
+        from += run.len();
+    }
+    kept
 }
 
 /// Takes the best line through the kept samples out of all of them.
@@ -85,6 +97,22 @@ fn take_line(s: &mut Residual, keep: &[bool]) {
 }
 
 impl Evaluation {
+    /// Residuals less the best line of each segment, with the spikes of `like` where given. What lasts longer than two
+    /// samples is an error and no spike.
+    pub(crate) fn of_segments(mut segments: Vec<Residual>, like: Option<&Self>) -> Self {
+        let Some(like) = like else {
+            let kept: Vec<Vec<bool>> = segments.iter_mut().map(straightened).map(only_short_spikes).collect();
+            for (s, keep) in segments.iter_mut().zip(&kept) {
+                take_line(s, keep);
+            }
+            return Self { segments, kept };
+        };
+        for (s, keep) in segments.iter_mut().zip(&like.kept) {
+            take_line(s, keep);
+        }
+        Self { segments, kept: like.kept.clone() }
+    }
+
     /// Residuals less the best line and the spikes of each segment.
     pub(crate) fn of(mut segments: Vec<Residual>) -> Self {
         let kept = segments.iter_mut().map(straightened).collect();

@@ -1,5 +1,6 @@
 //! What a fit leaves: its size on held-out data, its harmonics and lines, and the figures that show it.
 
+pub(crate) mod decomposition;
 pub(crate) mod evaluate;
 pub mod picture;
 pub(crate) mod residual;

@@ -164,15 +164,124 @@ const FAR_OFF_RAD: f64 = 0.05;
 const HISTOGRAM_BINS: usize = 61;
 const HISTOGRAM_DEVIATIONS: f64 = 5.0;
 
+/// A picture of errors alone: what instruments without mechanics have.
+pub(crate) fn picture_of(
+    names: &[String],
+    raw: Option<&Evaluation>,
+    declared: &Evaluation,
+    discovered: &Evaluation,
+    hypothesis: &Hypothesis,
+) -> Picture {
+    // segments stand in the order of the names
+    let name = |track: usize| {
+        let at = discovered.segments.iter().position(|s| s.track == track);
+        at.and_then(|at| names.get(at)).cloned().unwrap_or_default()
+    };
+    Picture {
+        angles: angles(raw.unwrap_or(discovered), hypothesis, name),
+        stages: harmonics_of_stages(raw, declared, discovered),
+        residuals: residuals(discovered, name),
+        memory: memory(discovered),
+        histogram: histogram(discovered),
+        ..Picture::default()
+    }
+}
+
+/// The first held-out stretch of each run, as recorded.
+fn angles(seen: &Evaluation, h: &Hypothesis, name: impl Fn(usize) -> String) -> Vec<AngleCurve> {
+    let slope = h.sense() * h.angular_gain;
+    let mut out: Vec<AngleCurve> = Vec::new();
+    for s in &seen.segments {
+        let name = name(s.track);
+        if out.iter().any(|c| c.name == name) {
+            continue;
+        }
+        let turned = |i: &usize| (slope * (s.turned[*i] - s.turned[0])).abs();
+        let shown: Vec<usize> = (0..s.angle.len()).take_while(|i| turned(i) < SHOWN_TURNS * h.period_rad).collect();
+        let stride = (shown.len() / CURVE_POINTS).max(1);
+        let kept = shown.into_iter().step_by(stride);
+        let mut curve = AngleCurve { name, ..AngleCurve::default() };
+        for i in kept {
+            curve.t_s.push(s.t_s[i]);
+            curve.wrapped_deg.push(s.direction[i].rem_euclid(h.period_rad).to_degrees());
+            curve.unwrapped_deg.push((slope * s.turned[i] + s.angle[i]).to_degrees());
+        }
+        out.push(curve);
+    }
+    out
+}
+
+fn harmonics_of_stages(
+    raw: Option<&Evaluation>,
+    declared: &Evaluation,
+    discovered: &Evaluation,
+) -> Vec<(String, Vec<Harmonic>)> {
+    // the noise is that of the last stage: what the others have besides is no noise
+    [("raw", raw), ("declared", Some(declared)), ("discovered", Some(discovered))]
+        .into_iter()
+        .filter_map(|(name, e)| e.map(|e| (name, e)))
+        .map(|(name, e)| (name.to_owned(), reported_harmonics(e, Follows::Pattern, discovered)))
+        .collect()
+}
+
+fn residuals(e: &Evaluation, name: impl Fn(usize) -> String) -> Vec<ResidualCurve> {
+    let mut out: Vec<ResidualCurve> = Vec::new();
+    for (s, kept) in e.segments.iter().zip(&e.kept) {
+        let samples: Vec<usize> = (0..s.angle.len()).filter(|&i| kept[i]).collect();
+        let mut curve = ResidualCurve { name: name(s.track), ..ResidualCurve::default() };
+        for part in samples.chunks((samples.len() / (CURVE_POINTS / 2)).max(1)) {
+            let by = |a: &&usize, b: &&usize| s.angle[**a].total_cmp(&s.angle[**b]);
+            let ends = [part.iter().min_by(by), part.iter().max_by(by)];
+            let mut ends: Vec<usize> = ends.into_iter().flatten().copied().collect();
+            ends.sort_unstable();
+            ends.dedup();
+            for i in ends {
+                curve.t_s.push(s.t_s[i]);
+                curve.error_deg.push(s.angle[i].to_degrees());
+            }
+        }
+        out.push(curve);
+    }
+    out
+}
+
+fn memory(e: &Evaluation) -> Memory {
+    let count = e.errors().count();
+    Memory { correlation: autocorrelation(e, LAGS), band99: white_band(count) }
+}
+
+fn histogram(e: &Evaluation) -> Histogram {
+    let deviation = e.mean_square().sqrt().to_degrees();
+    let width = 2.0 * HISTOGRAM_DEVIATIONS * deviation / HISTOGRAM_BINS as f64;
+    if width.is_nan() || width <= 0.0 {
+        return Histogram::default();
+    }
+    let low = -HISTOGRAM_DEVIATIONS * deviation;
+    let mut count = vec![0u64; HISTOGRAM_BINS];
+    let mut total = 0.0;
+    for error in e.errors() {
+        #[allow(clippy::cast_possible_truncation, reason = "saturates, and is then none of the bins")]
+        let at = ((error.to_degrees() - low) / width).floor() as i64;
+        if let Some(c) = usize::try_from(at).ok().and_then(|at| count.get_mut(at)) {
+            *c += 1;
+        }
+        total += 1.0;
+    }
+    let middle_deg: Vec<f64> = (0..HISTOGRAM_BINS).map(|b| low + (b as f64 + 0.5) * width).collect();
+    let density = |x: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());
+    let normal = middle_deg.iter().map(|&x| total * width * density(x)).collect();
+    Histogram { middle_deg, count, normal }
+}
+
 impl Scene<'_> {
     pub(crate) fn picture(&self) -> Picture {
         Picture {
-            angles: self.angles(),
+            angles: angles(self.raw.unwrap_or(self.discovered), self.hypothesis(), |track| self.name(track)),
             drives: self.drives(),
-            stages: self.stages(),
-            residuals: self.residuals(),
-            memory: self.memory(),
-            histogram: self.histogram(),
+            stages: harmonics_of_stages(self.raw, self.declared, self.discovered),
+            residuals: residuals(self.discovered, |track| self.name(track)),
+            memory: memory(self.discovered),
+            histogram: histogram(self.discovered),
             scaling: self.members.iter().map(|&at| self.sizes(at)).collect(),
             correlations: self.correlations(),
         }
@@ -184,32 +293,6 @@ impl Scene<'_> {
 
     fn name(&self, track: usize) -> String {
         self.bench.tracks[track].track.name.clone()
-    }
-
-    /// The first held-out stretch of each run, as recorded.
-    fn angles(&self) -> Vec<AngleCurve> {
-        let seen = self.raw.unwrap_or(self.discovered);
-        let h = self.hypothesis();
-        let slope = h.sense() * h.angular_gain;
-        let mut out: Vec<AngleCurve> = Vec::new();
-        for s in &seen.segments {
-            let name = self.name(s.track);
-            if out.iter().any(|c| c.name == name) {
-                continue;
-            }
-            let turned = |i: &usize| (slope * (s.turned[*i] - s.turned[0])).abs();
-            let shown: Vec<usize> = (0..s.angle.len()).take_while(|i| turned(i) < SHOWN_TURNS * h.period_rad).collect();
-            let stride = (shown.len() / CURVE_POINTS).max(1);
-            let kept = shown.into_iter().step_by(stride);
-            let mut curve = AngleCurve { name, ..AngleCurve::default() };
-            for i in kept {
-                curve.t_s.push(s.t_s[i]);
-                curve.wrapped_deg.push(s.direction[i].rem_euclid(h.period_rad).to_degrees());
-                curve.unwrapped_deg.push((slope * s.turned[i] + s.angle[i]).to_degrees());
-            }
-            out.push(curve);
-        }
-        out
     }
 
     /// Runs with commands that fill every bin of the pattern angle.
@@ -271,65 +354,6 @@ impl Scene<'_> {
             before_v: before,
             after_v: after,
         })
-    }
-
-    fn stages(&self) -> Vec<(String, Vec<Harmonic>)> {
-        // the noise is that of the last stage: what the others have besides is no noise
-        [("raw", self.raw), ("declared", Some(self.declared)), ("discovered", Some(self.discovered))]
-            .into_iter()
-            .filter_map(|(name, e)| e.map(|e| (name, e)))
-            .map(|(name, e)| (name.to_owned(), reported_harmonics(e, Follows::Pattern, self.discovered)))
-            .collect()
-    }
-
-    fn residuals(&self) -> Vec<ResidualCurve> {
-        let e = self.discovered;
-        let mut out: Vec<ResidualCurve> = Vec::new();
-        for (s, kept) in e.segments.iter().zip(&e.kept) {
-            let samples: Vec<usize> = (0..s.angle.len()).filter(|&i| kept[i]).collect();
-            let mut curve = ResidualCurve { name: self.name(s.track), ..ResidualCurve::default() };
-            for part in samples.chunks((samples.len() / (CURVE_POINTS / 2)).max(1)) {
-                let by = |a: &&usize, b: &&usize| s.angle[**a].total_cmp(&s.angle[**b]);
-                let ends = [part.iter().min_by(by), part.iter().max_by(by)];
-                let mut ends: Vec<usize> = ends.into_iter().flatten().copied().collect();
-                ends.sort_unstable();
-                ends.dedup();
-                for i in ends {
-                    curve.t_s.push(s.t_s[i]);
-                    curve.error_deg.push(s.angle[i].to_degrees());
-                }
-            }
-            out.push(curve);
-        }
-        out
-    }
-
-    fn memory(&self) -> Memory {
-        let count = self.discovered.errors().count();
-        Memory { correlation: autocorrelation(self.discovered, LAGS), band99: white_band(count) }
-    }
-
-    fn histogram(&self) -> Histogram {
-        let deviation = self.discovered.mean_square().sqrt().to_degrees();
-        let width = 2.0 * HISTOGRAM_DEVIATIONS * deviation / HISTOGRAM_BINS as f64;
-        if width.is_nan() || width <= 0.0 {
-            return Histogram::default();
-        }
-        let low = -HISTOGRAM_DEVIATIONS * deviation;
-        let mut count = vec![0u64; HISTOGRAM_BINS];
-        let mut total = 0.0;
-        for e in self.discovered.errors() {
-            #[allow(clippy::cast_possible_truncation, reason = "saturates, and is then none of the bins")]
-            let at = ((e.to_degrees() - low) / width).floor() as i64;
-            if let Some(c) = usize::try_from(at).ok().and_then(|at| count.get_mut(at)) {
-                *c += 1;
-            }
-            total += 1.0;
-        }
-        let middle_deg: Vec<f64> = (0..HISTOGRAM_BINS).map(|b| low + (b as f64 + 0.5) * width).collect();
-        let density = |x: f64| (-0.5 * (x / deviation).powi(2)).exp() / (deviation * std::f64::consts::TAU.sqrt());
-        let normal = middle_deg.iter().map(|&x| total * width * density(x)).collect();
-        Histogram { middle_deg, count, normal }
     }
 
     /// How large a member is in each run: the errors without it, set against the share that the joint fit gives it.

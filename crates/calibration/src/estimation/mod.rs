@@ -7,6 +7,7 @@ pub(crate) mod fit;
 pub mod identifiability;
 pub(crate) mod initial_guess;
 pub(crate) mod joint_fit;
+pub(crate) mod linear;
 pub(crate) mod propagation;
 pub(crate) mod statistics;
 pub(crate) mod sums;

@@ -9,6 +9,7 @@ use cvg_model::effects::{EffectId, Moment, Role, Stage, Values};
 use cvg_model::{Envelope, Real};
 use serde::{Deserialize, Serialize};
 
+use crate::model::angle_table::AngleTable;
 use crate::recording::Instrument;
 
 /// How an effect came into a hypothesis.
@@ -55,6 +56,35 @@ pub struct Hypothesis {
     pub damping_per_s: f64,
     /// effects, in the library's order; one with a searched parameter may be there more than once
     pub members: Vec<Member>,
+    /// an angle sensor's table of what repeats with position and no effect explains
+    pub angle_table: Option<AngleTable>,
+    /// channels cut off by their converters, after all readout effects
+    pub clip: Option<ChannelClip>,
+    /// a rate gyroscope's bias, rad/s
+    pub rate_bias_rad_s: f64,
+}
+
+/// Channels of a sensor that are cut off at the rails of their converters. A channel at a rail says "at least"; the other
+/// one and the amplitude, which a sensor holds, tell it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ChannelClip {
+    /// lower and upper rail of x and of y, V; infinite where none is reached
+    pub rails_v: [[f64; 2]; 2],
+    /// amplitude of the vibration behind the readout, V
+    pub amplitude_v: f64,
+}
+
+impl ChannelClip {
+    /// The vibration `z` that was undone from the readout `e`, with a channel at its rail put right.
+    fn restored(&self, e: &Envelope<f64>, z: Envelope<f64>) -> Envelope<f64> {
+        let reached = |v: f64, [low, high]: [f64; 2]| v <= low || v >= high;
+        let other = |v: f64| (self.amplitude_v.powi(2) - v * v).max(0.0).sqrt();
+        match [reached(e.x_c, self.rails_v[0]), reached(e.y_c, self.rails_v[1])] {
+            [true, false] => Envelope { x_c: z.x_c.signum() * other(z.y_c).max(z.x_c.abs()), ..z },
+            [false, true] => Envelope { y_c: z.y_c.signum() * other(z.x_c).max(z.y_c.abs()), ..z },
+            _ => z,
+        }
+    }
 }
 
 /// Something a fit adjusts.
@@ -84,6 +114,9 @@ impl Hypothesis {
             control_latency_s: 0.0,
             damping_per_s: 0.0,
             members: Vec::new(),
+            angle_table: None,
+            clip: None,
+            rate_bias_rad_s: 0.0,
         }
     }
 
@@ -167,9 +200,23 @@ impl Hypothesis {
         self.members.iter().enumerate().filter(move |(_, m)| m.id.description().stage == stage)
     }
 
-    /// The vibration behind a readout: the members' readout effects undone, last first.
+    /// The vibration behind a readout: the members' readout effects undone, last first. A table stands between those of the
+    /// channels and those of the angle: it repeats with the angle that was read, and that may be late.
     pub fn unread(&self, e: Envelope<f64>, at: &Moment<f64>) -> Envelope<f64> {
-        self.acting(Stage::Readout).rev().fold(e, |e, (_, m)| m.id.unread(&m.values, e, at))
+        let undo = |z: Envelope<f64>, of_angle: bool| {
+            let members = self.acting(Stage::Readout).rev().filter(move |(_, m)| m.id.acts_on_angle() == of_angle);
+            members.fold(z, |z, (_, m)| m.id.unread(&m.values, z, at))
+        };
+        let channels = undo(e, false);
+        let z = self.clip.map_or(channels, |clip| clip.restored(&e, channels));
+        undo(self.angle_table.as_ref().map_or(z, |table| self.without(table, z)), true)
+    }
+
+    /// A vibration turned back by what a table adds to its angle.
+    fn without(&self, table: &AngleTable, z: Envelope<f64>) -> Envelope<f64> {
+        let theta = self.bearing(&z);
+        let (sin, cos) = (table.undo(theta, std::f64::consts::TAU / self.period_rad) - theta).sin_cos();
+        z.turned(sin, cos)
     }
 
     /// The fastest that an input effect changes, cycles of the table angle per turn; 0 without one.

@@ -1,5 +1,6 @@
 //! An instrument as believed, and what it says of one sample, with slopes against what is fitted.
 
+pub(crate) mod angle_table;
 pub(crate) mod hypothesis;
 pub(crate) mod jet;
 pub(crate) mod prediction;

@@ -8,7 +8,8 @@ use cvg_model::effects::EffectId;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
-use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::model::angle_table::AngleTable;
+use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
 use crate::recording::Instrument;
 
 /// Identifier of the format.
@@ -48,8 +49,19 @@ struct File {
     follows_input: bool,
     force_scale_per_v_s: f64,
     control_latency_s: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    rate_bias_rad_s: f64,
     #[serde(default)]
     effect: Vec<EffectEntry>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    angle_table: Option<AngleTable>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    clip: Option<ChannelClip>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 #[derive(Serialize, Deserialize)]
@@ -92,6 +104,9 @@ impl Calibration {
                         .collect(),
                 })
                 .collect(),
+            rate_bias_rad_s: h.rate_bias_rad_s,
+            angle_table: h.angle_table.clone(),
+            clip: h.clip,
         };
         let mut text = String::from("# Identified by cvg. Edited by hand, it is refused.\n");
         // every field is a plain value: serialisation has nothing to fail on
@@ -143,6 +158,13 @@ impl Calibration {
             hypothesis.members.push(member(e, name)?);
         }
         hypothesis.members.sort_by_key(|m| m.id);
+        let cycles = std::f64::consts::TAU / hypothesis.period_rad;
+        if file.angle_table.as_ref().is_some_and(|t| t.cos.len() != t.sin.len() || !t.is_invertible(cycles)) {
+            return refuse("angle_table is no table that can be undone".into(), "a calibration as cvg wrote it");
+        }
+        hypothesis.angle_table = file.angle_table;
+        hypothesis.clip = file.clip;
+        hypothesis.rate_bias_rad_s = file.rate_bias_rad_s;
         Ok(Self { device: file.device, hypothesis })
     }
 

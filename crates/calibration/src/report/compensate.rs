@@ -39,6 +39,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     };
     let track = Track::whole(run, h.period_rad)?;
     let mut out = recording.clone();
+    let first_s = recording.t_s.first().copied().unwrap_or(0.0);
     let none = Unknowns::new(h, Vec::new());
     let predictor = Predictor::new(h, &none);
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
@@ -63,7 +64,8 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
                 }
             }
             if let Some(theta) = &mut out.theta_deg {
-                theta[i] += wrapped(h.bearing(&z) - h.bearing(&seen), h.period_rad).to_degrees();
+                let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
+                theta[i] += (wrapped(h.bearing(&z) - h.bearing(&seen), h.period_rad) - drift_rad).to_degrees();
             }
             if let Some(table) = &mut out.table_deg {
                 table[i] += row.excess.to_degrees();

@@ -339,6 +339,11 @@ impl EffectId {
         Self::ALL.iter().copied().find(|e| e.description().id == id)
     }
 
+    /// Whether a readout effect is added to the angle of the vibration itself, before plates, axes, amplifier and converter.
+    pub fn acts_on_angle(self) -> bool {
+        self.description().stage == Stage::Readout && self < Self::DetectionCubic
+    }
+
     /// Parameter values at which the effect is absent.
     pub fn neutral<T: Real + crate::Float>(self) -> Values<T> {
         let mut values = [T::zero(); MAX_PARAMETERS];

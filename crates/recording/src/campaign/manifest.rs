@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Instrument, Role, RunKind};
+use super::{Instrument, Reference, Role, RunKind};
 use crate::error::ReadError;
 use crate::naming::Naming;
 
@@ -41,6 +41,8 @@ pub(super) struct Manifest {
     pub(super) carrier_hz: Option<f64>,
     pub(super) angular_gain: Option<f64>,
     pub(super) period_deg: Option<f64>,
+    pub(super) reference: Option<Reference>,
+    pub(super) pole_pairs: Option<f64>,
     /// What the recordings call their columns.
     pub(super) naming: Naming,
     pub(super) runs: Vec<Entry>,
@@ -52,7 +54,8 @@ pub(super) fn refuse(path: &Path, at: Position, what: String, wanted: String) ->
     ReadError::Campaign { path: path.to_path_buf(), line: at.line, column: at.column, what, wanted }
 }
 
-const CAMPAIGN_KEYS: &[&str] = &["device", "instrument", "carrier_hz", "angular_gain", "period_deg"];
+const CAMPAIGN_KEYS: &[&str] =
+    &["device", "instrument", "carrier_hz", "angular_gain", "period_deg", "reference", "pole_pairs"];
 const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude"];
 const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
 
@@ -116,9 +119,24 @@ impl Text<'_> {
         let carrier_hz = self.number(head, "carrier_hz", "a positive number of Hz", |value| value > 0.0)?;
         let angular_gain = self.number(head, "angular_gain", "a number other than 0", |value| value != 0.0)?;
         let period_deg = self.number(head, "period_deg", "180 or 360", |value| value == 180.0 || value == 360.0)?;
+        let references = [("measured", Reference::Measured), ("commanded", Reference::Commanded)];
+        let reference = self.choice(head, "reference", &references)?;
+        let is_count = |value: f64| value >= 1.0 && value.fract() == 0.0;
+        let pole_pairs = self.number(head, "pole_pairs", "a whole number from 1 on", is_count)?;
         let naming = self.columns(document)?;
         let runs = self.runs(document, instrument)?;
-        Ok(Manifest { device, instrument, carrier_hz, angular_gain, period_deg, naming, runs, warnings })
+        Ok(Manifest {
+            device,
+            instrument,
+            carrier_hz,
+            angular_gain,
+            period_deg,
+            reference,
+            pole_pairs,
+            naming,
+            runs,
+            warnings,
+        })
     }
 
     /// `[columns]`: a channel on the left, what the recordings call it on the right.

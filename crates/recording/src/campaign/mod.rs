@@ -25,6 +25,15 @@ pub enum Instrument {
     Sensor,
 }
 
+/// What the reference of a campaign is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reference {
+    /// The angle or the rate was measured.
+    Measured,
+    /// It is what was asked for: the table may have done something else.
+    Commanded,
+}
+
 /// What was done in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RunKind {
@@ -99,6 +108,10 @@ pub struct Campaign {
     pub angular_gain: Option<f64>,
     /// Period of the angle from I/Q, deg: 180 for a pattern angle, 360 for a full-turn sensor.
     pub period_deg: Option<f64>,
+    /// Whether the reference was measured or only asked for, where the campaign says so.
+    pub reference: Option<Reference>,
+    /// Periods of the sensor's angle per turn of its reference, where the campaign says so.
+    pub pole_pairs: Option<f64>,
     /// The runs, in the order of the file.
     pub runs: Vec<Run>,
     /// What a reader of the result should know of the campaign file; the recordings have their own warnings.
@@ -207,7 +220,7 @@ impl Campaign {
             run.settled()?;
             runs.push(run);
         }
-        let Manifest { device, instrument, carrier_hz, angular_gain, period_deg, .. } = manifest;
+        let Manifest { device, instrument, carrier_hz, angular_gain, period_deg, reference, pole_pairs, .. } = manifest;
         Ok(Self {
             source: path.to_path_buf(),
             device,
@@ -215,6 +228,8 @@ impl Campaign {
             carrier_hz,
             angular_gain,
             period_deg,
+            reference,
+            pole_pairs,
             runs,
             warnings,
         })
@@ -236,6 +251,11 @@ impl Campaign {
         push_number(&mut text, "carrier_hz", self.carrier_hz);
         push_number(&mut text, "angular_gain", self.angular_gain);
         push_number(&mut text, "period_deg", self.period_deg);
+        push_number(&mut text, "pole_pairs", self.pole_pairs);
+        if let Some(reference) = self.reference {
+            let word = if reference == Reference::Commanded { "commanded" } else { "measured" };
+            let _ = writeln!(text, "reference = \"{word}\"");
+        }
         for run in &self.runs {
             let kind = if run.kind == RunKind::Rotation { "rotation" } else { "ringdown" };
             let file = quoted(&run.file.to_string_lossy());

@@ -1,0 +1,203 @@
+//! Blocked cross-validation within the data to fit: what predicts rows that it has not seen. Blocks are contiguous, so
+//! that neighbours of a row do not betray it (Burman, Chow and Nolan 1994; Roberts et al. 2017), and the simplest model
+//! within one standard error of the best is taken, the errors paired over blocks (Breiman et al. 1984).
+
+use super::readout::Readout;
+use super::samples::SensorRun;
+use super::table_fit::{Sample, Shape, TableFit};
+
+/// Folds of blocks; blocks of all rows of a run where they are interleaved, and of a run that repeats its period.
+const FOLDS: usize = 5;
+const INTERLEAVED_BLOCKS: usize = 60;
+const CONTIGUOUS_BLOCKS: usize = 20;
+/// Periods that each run has to cover for whole runs to be left out, and one run for contiguous fifths.
+const PERIODS_OF_RUNS: f64 = 0.9;
+const PERIODS_OF_ONE: f64 = 1.75;
+/// Whole runs are left out from this many on.
+const FEWEST_RUNS: usize = 3;
+/// Standard errors that a simpler model may be worse by.
+const STANDARD_ERRORS: f64 = 1.0;
+
+/// Which rows are left out together, and which are judged together.
+#[derive(Debug, Clone)]
+pub(crate) struct Folds {
+    /// fold of each row, all runs one after the other
+    pub(crate) fold: Vec<usize>,
+    /// block of each row
+    pub(crate) block: Vec<usize>,
+    pub(crate) count: usize,
+    /// blocks in all
+    pub(crate) blocks: usize,
+    /// a left-out part is judged about its own mean, as a held-out run is
+    about_mean: bool,
+}
+
+impl Folds {
+    /// Whole runs where three or more cover the period; fifths in time where one run repeats it; else interleaved blocks.
+    pub(crate) fn of(runs: &[SensorRun], cycles_per_rad: f64) -> Self {
+        let periods: Vec<f64> = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU).collect();
+        let least = periods.iter().copied().fold(f64::INFINITY, f64::min);
+        let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
+        let whole = runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS;
+        let fifths = runs.len() == 1 && least > PERIODS_OF_ONE;
+        for (number, run) in runs.iter().enumerate() {
+            let n = run.len();
+            let width = (n / INTERLEAVED_BLOCKS).max(1);
+            for i in 0..n {
+                let (f, b) = if whole {
+                    (number, 0)
+                } else if fifths {
+                    (i * FOLDS / n, i * CONTIGUOUS_BLOCKS / n)
+                } else {
+                    (i / width % FOLDS, i / width)
+                };
+                fold.push(f);
+                block.push(blocks + b);
+            }
+            blocks = block.last().map_or(0, |b| b + 1);
+        }
+        let count = fold.iter().max().map_or(0, |f| f + 1);
+        Self { fold, block, count, blocks, about_mean: whole || fifths }
+    }
+
+    /// Interleaved blocks of every run.
+    pub(crate) fn interleaved(runs: &[SensorRun]) -> Self {
+        let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
+        for run in runs {
+            let width = (run.len() / INTERLEAVED_BLOCKS).max(1);
+            fold.extend((0..run.len()).map(|i| i / width % FOLDS));
+            block.extend((0..run.len()).map(|i| blocks + i / width));
+            blocks = block.last().map_or(0, |b| b + 1);
+        }
+        let count = fold.iter().max().map_or(0, |f| f + 1);
+        Self { fold, block, count, blocks, about_mean: false }
+    }
+
+    /// The runs without the rows of a fold.
+    pub(crate) fn without(&self, runs: &[SensorRun], fold: usize) -> Vec<SensorRun> {
+        let mut first = 0;
+        runs.iter()
+            .map(|r| {
+                let rows: Vec<usize> = (0..r.len()).filter(|i| self.fold[first + i] != fold).collect();
+                first += r.len();
+                r.subset(&rows)
+            })
+            .collect()
+    }
+}
+
+/// Squared errors of left-out rows, by block.
+#[derive(Debug, Clone)]
+pub(crate) struct Losses {
+    sum: Vec<f64>,
+    rows: usize,
+}
+
+impl Losses {
+    /// Root of the mean square.
+    pub(crate) fn rms(&self) -> f64 {
+        (self.total() / self.rows.max(1) as f64).sqrt()
+    }
+
+    fn total(&self) -> f64 {
+        self.sum.iter().sum()
+    }
+
+    /// Mean and standard error of the difference to another's, summed over blocks.
+    fn excess_over(&self, other: &Self) -> (f64, f64) {
+        let d: Vec<f64> = self.sum.iter().zip(&other.sum).map(|(a, b)| a - b).collect();
+        let n = d.len() as f64;
+        let total: f64 = d.iter().sum();
+        let variance = d.iter().map(|x| (x - total / n).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+        (total, (n * variance).sqrt())
+    }
+
+    /// No worse than `other` by more than the standard errors allowed.
+    pub(crate) fn is_as_good_as(&self, other: &Self) -> bool {
+        let (excess, error) = self.excess_over(other);
+        excess <= STANDARD_ERRORS * error
+    }
+
+    /// Better than `other` by more than the standard errors asked for.
+    pub(crate) fn is_better_than(&self, other: &Self) -> bool {
+        let (excess, error) = other.excess_over(self);
+        excess > STANDARD_ERRORS * error
+    }
+}
+
+/// Cross-validates a shape; `samples_without` gives all rows with a readout that was fitted without a fold.
+pub(crate) fn cross_validate<'a>(
+    samples_without: impl Fn(usize) -> Option<&'a [Sample]>,
+    folds: &Folds,
+    shape: &Shape,
+    runs: usize,
+    cycles: f64,
+) -> Option<Losses> {
+    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0 };
+    for left_out in 0..folds.count {
+        let samples = samples_without(left_out)?;
+        let train: Vec<Sample> =
+            samples.iter().zip(&folds.fold).filter(|(_, f)| **f != left_out).map(|(s, _)| *s).collect();
+        let fitted = TableFit::new(shape, &train, runs, cycles)?;
+        let test: Vec<(f64, usize, usize)> = (0..samples.len())
+            .filter(|&i| folds.fold[i] == left_out)
+            .map(|i| (fitted.left(&samples[i]), samples[i].run, folds.block[i]))
+            .collect();
+        let mut mean = vec![(0.0, 0usize); runs];
+        for (left, run, _) in &test {
+            mean[*run].0 += left;
+            mean[*run].1 += 1;
+        }
+        for (left, run, block) in test {
+            let constant = match fitted.constants[run] {
+                Some(c) if !folds.about_mean => c,
+                _ => mean[run].0 / mean[run].1 as f64,
+            };
+            losses.sum[block] += (left - constant).powi(2);
+            losses.rows += 1;
+        }
+    }
+    losses.sum.iter().all(|v| v.is_finite()).then_some(losses)
+}
+
+/// Cross-validates a readout by the ln of its radius, about its mean over the rows that were fitted.
+pub(crate) fn losses_of_radius(
+    readout_without: impl Fn(usize) -> Option<Readout>,
+    folds: &Folds,
+    runs: &[SensorRun],
+) -> Option<Losses> {
+    let readings: Vec<[f64; 2]> = runs.iter().filter_map(SensorRun::channels).flatten().copied().collect();
+    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0 };
+    for left_out in 0..folds.count {
+        let readout = readout_without(left_out)?;
+        let rows = readings.iter().zip(&folds.fold).zip(&folds.block).filter(|((z, _), _)| !readout.rails.clips(**z));
+        for ((z, _), block) in rows.filter(|((_, f), _)| **f == left_out) {
+            let [x, y] = readout.undo(*z);
+            losses.sum[*block] += (x.hypot(y) / readout.radius + f64::MIN_POSITIVE).ln().powi(2);
+            losses.rows += 1;
+        }
+    }
+    losses.sum.iter().all(|v| v.is_finite()).then_some(losses)
+}
+
+/// A model that was cross-validated.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate<M> {
+    /// unknowns
+    pub(crate) size: usize,
+    pub(crate) model: M,
+    pub(crate) losses: Losses,
+}
+
+/// The simplest candidate that is as good as the best. Ties of size go to the smaller loss, and ties of that to the
+/// order of the models: the order in which they were tried has no say.
+pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>]) -> Option<&Candidate<M>> {
+    let by_loss = |a: &&Candidate<M>, b: &&Candidate<M>| {
+        a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
+    };
+    let best = candidates.iter().min_by(by_loss)?;
+    candidates
+        .iter()
+        .filter(|c| c.losses.is_as_good_as(&best.losses))
+        .min_by(|a, b| a.size.cmp(&b.size).then_with(|| by_loss(a, b)))
+}

@@ -1,0 +1,371 @@
+//! An identified sensor in the words of the library: its readout as library effects with intervals, its table, lines and
+//! following of motion as what they are, and the hypothesis that undoes them.
+
+use cvg_model::effects::{EffectId, harmonic_n};
+
+use super::model::{Outcome, SensorModel};
+use super::readout::{Kind, Readout};
+use super::readout_fit::fit;
+use super::samples::SensorRun;
+use super::table_fit::Motion;
+use super::table_fit::TableFit;
+use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
+use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
+use crate::recording::Instrument;
+use crate::report::{EffectReport, Estimate, ParameterReport};
+
+/// Values of a readout in the parameters of the library.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LibraryReadout {
+    /// offsets of x and y, in the unit of the channels
+    pub(crate) offset: [f64; 2],
+    /// G_Dy/G_Dx
+    pub(crate) gain_ratio: f64,
+    pub(crate) skew: f64,
+    /// mean cubic and half the difference of x and y, per unit of the channels squared
+    pub(crate) kappa: f64,
+    pub(crate) kappa_difference: f64,
+    /// amplitude of the vibration behind the readout, in the unit of the channels
+    pub(crate) amplitude: f64,
+}
+
+impl From<&Readout> for LibraryReadout {
+    /// A (1 − ¾κ) u + A κ u³ is a v (1 + ¾κ_L a² v²) with a = A (1 − ¾κ): the same in other words.
+    fn from(r: &Readout) -> Self {
+        let [kx, ky] = r.cubics();
+        let (fundamental_x, fundamental_y) = (1.0 - 0.75 * kx, 1.0 - 0.75 * ky);
+        let amplitude = r.amplitude * r.radius * fundamental_x;
+        let gain = r.p[2].exp();
+        let gain_ratio = gain * fundamental_y / fundamental_x;
+        let cubic =
+            |kappa: f64, gain: f64| 4.0 / 3.0 * kappa * gain * r.amplitude * r.radius.powi(3) / amplitude.powi(3);
+        let [x, y] = [cubic(kx, 1.0), cubic(ky, gain) / gain_ratio];
+        Self {
+            offset: [r.centre[0] + r.amplitude * r.p[0], r.centre[1] + r.amplitude * r.p[1]],
+            gain_ratio,
+            skew: r.p[3] * gain / gain_ratio,
+            kappa: 0.5 * (x + y),
+            kappa_difference: 0.5 * (x - y),
+            amplitude,
+        }
+    }
+}
+
+impl LibraryReadout {
+    /// Offsets, gain ratio, skew, cubics.
+    fn values(&self) -> [f64; 6] {
+        [self.offset[0], self.offset[1], self.gain_ratio, self.skew, self.kappa, self.kappa_difference]
+    }
+}
+
+/// Deviations of all that was fitted, by the jackknife over contiguous blocks.
+#[derive(Debug, Clone)]
+pub(crate) struct Deviations {
+    /// of [`LibraryReadout::values`]
+    readout: [f64; 6],
+    /// of [`TableFit::side`]
+    side: Vec<f64>,
+    /// of the table's cosines and sines
+    cos: Vec<f64>,
+    sin: Vec<f64>,
+}
+
+/// A fit without one block: the readout, where there is one, and the table.
+type Refit = (Option<LibraryReadout>, TableFit);
+
+/// Makes every fit anew without one block of each run after the other (Künsch 1989).
+pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations {
+    let fits: Vec<Refit> = (0..BLOCKS)
+        .filter_map(|block| {
+            let without = |r: &SensorRun| {
+                let n = r.len();
+                let rows: Vec<usize> = (0..n).filter(|i| i * BLOCKS / n != block).collect();
+                r.subset(&rows)
+            };
+            let kept: Vec<SensorRun> = runs.iter().map(without).collect();
+            let readout = match &model.readout {
+                Some((r, weighting)) if r.kind != Kind::Plain => {
+                    Some(fit(r.kind, *weighting, &kept, model.sensor.gain, r)?.readout)
+                }
+                Some((r, _)) => Some(r.clone()),
+                None => None,
+            };
+            let samples = model.sensor.samples(&kept, readout.as_ref());
+            let table = TableFit::new(&model.table.shape, &samples, kept.len(), model.sensor.cycles)?;
+            Some((readout.as_ref().map(LibraryReadout::from), table))
+        })
+        .collect();
+    let of = |value: &dyn Fn(&Refit) -> f64| {
+        let values: Vec<f64> = fits.iter().map(value).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        ((n - 1.0) / n * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt()
+    };
+    let readout = |i: usize| of(&|f| f.0.map_or(0.0, |r| r.values()[i]));
+    let order = model.table.table.cos.len();
+    let other = noise_model_difference(model, runs);
+    Deviations {
+        readout: std::array::from_fn(|i| readout(i).hypot(other[i] / STUDENT_19)),
+        side: (0..model.table.side.len()).map(|i| of(&|f| f.1.side[i])).collect(),
+        cos: (0..order).map(|i| of(&|f| f.1.table.cos[i])).collect(),
+        sin: (0..order).map(|i| of(&|f| f.1.table.sin[i])).collect(),
+    }
+}
+
+/// By what a readout known from its radius alone would differ if the noise of the radius were additive and not in
+/// proportion to it: the algebraic ellipse instead of the one in the logarithm. Where an ellipse is not what the channels
+/// draw the two differ by more than either scatters, and no block tells which is right (Hausman 1978).
+fn noise_model_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
+    let Some(readout) = model.front().filter(|r| model.by_radius && r.kind == Kind::Affine) else { return [0.0; 6] };
+    let Some(algebraic) = super::ellipse::algebraic(runs) else { return [0.0; 6] };
+    let [ours, theirs] = [readout, &algebraic].map(|r| LibraryReadout::from(r).values());
+    std::array::from_fn(|i| ours[i] - theirs[i])
+}
+
+fn interval(value: f64, deviation: f64) -> Option<[f64; 2]> {
+    deviation.is_finite().then_some([value - STUDENT_19 * deviation, value + STUDENT_19 * deviation])
+}
+
+fn parameter(name: &str, unit: &str, value: f64, deviation: f64) -> ParameterReport {
+    ParameterReport { name: name.into(), unit: unit.into(), value, ci95: interval(value, deviation) }
+}
+
+fn effect(id: &str, origin: Origin, parameters: Vec<ParameterReport>, evidence: String) -> EffectReport {
+    EffectReport {
+        id: id.into(),
+        origin,
+        parameters,
+        heldout_rms_deg: None,
+        evidence,
+        confounded_with: Vec::new(),
+        separated_by: None,
+    }
+}
+
+/// An identified sensor with the deviations of what was fitted.
+pub(crate) struct Described<'a> {
+    pub(crate) model: &'a SensorModel,
+    pub(crate) deviations: &'a Deviations,
+}
+
+impl Described<'_> {
+    /// k, in the sign that the campaign states.
+    pub(crate) fn angular_gain(&self, stated: Option<f64>) -> Estimate {
+        let (gain, deviation) = self.signed_gain();
+        let sign = if stated.map_or(-gain, |s| s).is_sign_negative() { -1.0 } else { 1.0 };
+        let value = sign * gain.abs();
+        Estimate { value, ci95: [value - STUDENT_19 * deviation, value + STUDENT_19 * deviation] }
+    }
+
+    /// The gain of θ over the reference, and its deviation: none where it is exact.
+    fn signed_gain(&self) -> (f64, f64) {
+        let shape = &self.model.table.shape;
+        let at = shape.motion.size();
+        if !shape.free_gain {
+            return (self.model.sensor.gain, 0.0);
+        }
+        (self.model.sensor.gain + self.model.table.side[at], self.deviations.side[at])
+    }
+
+    /// G_Dy/G_Dx, where offset, gain and skew were fitted.
+    pub(crate) fn gain_ratio(&self) -> Option<Estimate> {
+        let (readout, _) = self.model.readout.as_ref().filter(|(r, _)| r.kind >= Kind::Affine)?;
+        let value = LibraryReadout::from(readout).gain_ratio;
+        let ci95 = interval(value, self.deviations.readout[2])?;
+        Some(Estimate { value, ci95 })
+    }
+
+    /// Every effect that the data supports.
+    pub(crate) fn effects(&self) -> Vec<EffectReport> {
+        if self.model.outcome == Outcome::Neutral {
+            return Vec::new();
+        }
+        let mut out = self.readout_effects();
+        out.extend(self.motion_effects());
+        out.extend(self.table_effect());
+        out.extend(self.line_effects());
+        out
+    }
+
+    fn evidence(&self) -> String {
+        let of = if self.model.by_radius { "of the radius" } else { "of the angle" };
+        let degrees =
+            |v: f64| if self.model.by_radius { format!("{v:.4}") } else { format!("{:.4}°", v.to_degrees()) };
+        let before = self.model.predicted_raw.map_or(String::new(), |raw| format!(", {} as recorded", degrees(raw)));
+        format!(
+            "blocked cross-validation within the fitted rows leaves {} {of} with all that was found{before}; interval by \
+             jackknife over {BLOCKS} blocks",
+            degrees(self.model.predicted)
+        )
+    }
+
+    fn readout_effects(&self) -> Vec<EffectReport> {
+        let Some((readout, _)) = &self.model.readout else { return Vec::new() };
+        let (v, d) = (LibraryReadout::from(readout).values(), self.deviations.readout);
+        let significant = |i: usize, neutral: f64| (v[i] - neutral).abs() > STUDENT_19 * d[i];
+        let mut out = Vec::new();
+        let mut add = |id: EffectId, origin: Origin, at: &[usize]| {
+            let library = id.description().parameters;
+            let parameters = at.iter().zip(library).map(|(&i, p)| parameter(p.name, p.unit, v[i], d[i])).collect();
+            out.push(effect(
+                library_id(id),
+                origin,
+                parameters,
+                format!("{}; {}", id.description().signature, self.evidence()),
+            ));
+        };
+        let kind = readout.kind;
+        if kind >= Kind::Affine {
+            add(EffectId::DetectionGainMismatch, Origin::Declared, &[2]);
+        }
+        if kind >= Kind::Offset && (significant(0, 0.0) || significant(1, 0.0)) {
+            add(EffectId::DetectionOffset, Origin::Discovered, &[0, 1]);
+        }
+        if kind >= Kind::Affine && significant(3, 0.0) {
+            add(EffectId::DetectionSkew, Origin::Discovered, &[3]);
+        }
+        if kind >= Kind::Cubic && (significant(4, 0.0) || significant(5, 0.0)) {
+            add(EffectId::DetectionCubic, Origin::Discovered, if kind == Kind::Cubic { &[4] } else { &[4, 5] });
+        }
+        if readout.rails.any() {
+            let names = ["x_low", "x_high", "y_low", "y_high"];
+            let limits = readout.rails.limits.iter().flatten().zip(names).filter(|(l, _)| l.is_finite());
+            let rails =
+                limits.map(|(l, name)| ParameterReport { name: name.into(), unit: "V".into(), value: *l, ci95: None });
+            let evidence = "the extreme value of the channel occurs far more often than the level beside it: a converter \
+                            at its rail; the other channel and the radius stand in for it";
+            out.push(effect("detection-clip", Origin::Discovered, rails.collect(), evidence.into()));
+        }
+        out
+    }
+
+    fn motion_effects(&self) -> Vec<EffectReport> {
+        let (side, d) = (&self.model.table.side, &self.deviations.side);
+        let gain = self.model.sensor.gain;
+        let lag = || {
+            let p = vec![parameter("latency", "s", -side[0] / gain, d[0] / gain.abs())];
+            let signature = EffectId::AngleLatency.description().signature;
+            effect(
+                library_id(EffectId::AngleLatency),
+                Origin::Discovered,
+                p,
+                format!("{signature}; {}", self.evidence()),
+            )
+        };
+        match self.model.table.shape.motion {
+            Motion::None => Vec::new(),
+            Motion::Direction => {
+                let p = vec![
+                    parameter("n", "1", 0.0, f64::NAN),
+                    parameter("amplitude", "rad", side[0] * gain.signum(), d[0]),
+                    parameter("scaling", "1", harmonic_n::scaling::DIRECTION, f64::NAN),
+                ];
+                let evidence = format!("a constant that changes sign with the direction; {}", self.evidence());
+                vec![effect(library_id(EffectId::HarmonicN), Origin::Empirical, p, evidence)]
+            }
+            Motion::Rate => vec![lag()],
+            Motion::RateAndAcceleration => {
+                let p = vec![parameter("acceleration_lag", "s^2", -side[1] / gain, d[1] / gain.abs())];
+                let evidence = format!("angle ∝ acceleration, as of a type-II tracking loop; {}", self.evidence());
+                vec![lag(), effect("acceleration-lag", Origin::Empirical, p, evidence)]
+            }
+        }
+    }
+
+    fn table_effect(&self) -> Option<EffectReport> {
+        let table = &self.model.table.table;
+        let parameters: Vec<ParameterReport> = (0..table.cos.len())
+            .flat_map(|i| {
+                [
+                    parameter(&format!("cos_{}", i + 1), "rad", table.cos[i], self.deviations.cos[i]),
+                    parameter(&format!("sin_{}", i + 1), "rad", table.sin[i], self.deviations.sin[i]),
+                ]
+            })
+            .collect();
+        let form = match table.form {
+            crate::model::angle_table::Form::Own => "written in the sensor's own angle",
+            crate::model::angle_table::Form::Forward => "written in the true angle and inverted",
+        };
+        let evidence = format!(
+            "repeats with position and no effect of the library explains it: a Fourier series of {} harmonics, {form}; {}",
+            table.cos.len(),
+            self.evidence()
+        );
+        (!parameters.is_empty()).then(|| effect("angle-table", Origin::Empirical, parameters, evidence))
+    }
+
+    fn line_effects(&self) -> Vec<EffectReport> {
+        let shape = &self.model.table.shape;
+        let first = shape.side() - 2 * shape.lines.len();
+        let (side, d) = (&self.model.table.side, &self.deviations.side);
+        let line = |(i, n): (usize, &u32)| {
+            let (c, s) = (side[first + 2 * i], side[first + 2 * i + 1]);
+            let (dc, ds) = (d[first + 2 * i], d[first + 2 * i + 1]);
+            let size = c.hypot(s).max(f64::MIN_POSITIVE);
+            let p = vec![
+                parameter("n", "1", f64::from(*n), f64::NAN),
+                parameter("amplitude", "rad", size, (c * dc).hypot(s * ds) / size),
+                parameter(
+                    "phase",
+                    "deg",
+                    (-s).atan2(c).to_degrees(),
+                    ((s * dc).hypot(c * ds) / (size * size)).to_degrees(),
+                ),
+            ];
+            let evidence = format!("{n} per turn of the reference, beyond the table; {}", self.evidence());
+            effect(library_id(EffectId::TableHarmonic), Origin::Empirical, p, evidence)
+        };
+        shape.lines.iter().enumerate().map(line).collect()
+    }
+
+    /// What a compensation undoes: readout, following of motion, table. Lines belong to the reference and not to the
+    /// sensor, and are left out.
+    pub(crate) fn hypothesis(&self, stated: Option<f64>) -> Hypothesis {
+        let m = self.model;
+        let gain = self.angular_gain(stated).value;
+        let mut h = Hypothesis::ideal(Instrument::Sensor, m.sensor.period, gain);
+        // Equation 1 counts against the input
+        h.follows_input = gain * self.signed_gain().0 > 0.0;
+        if m.outcome == Outcome::Neutral {
+            return h;
+        }
+        let mut admit = |id: EffectId, origin: Origin, values: [f64; 4]| {
+            let at = h.members.partition_point(|m| m.id <= id);
+            h.members.insert(at, Member { id, values, origin, refined: true });
+        };
+        if let Some((readout, _)) = &m.readout {
+            let v = LibraryReadout::from(readout);
+            if readout.kind >= Kind::Offset {
+                admit(EffectId::DetectionOffset, Origin::Discovered, [v.offset[0], v.offset[1], 0.0, 0.0]);
+            }
+            if readout.kind >= Kind::Affine {
+                admit(EffectId::DetectionGainMismatch, Origin::Declared, [v.gain_ratio, 0.0, 0.0, 0.0]);
+                admit(EffectId::DetectionSkew, Origin::Discovered, [v.skew, 0.0, 0.0, 0.0]);
+            }
+            if readout.kind >= Kind::Cubic {
+                admit(EffectId::DetectionCubic, Origin::Discovered, [v.kappa, v.kappa_difference, 0.0, 0.0]);
+            }
+        }
+        let side = &m.table.side;
+        match m.table.shape.motion {
+            Motion::None => {}
+            Motion::Direction => {
+                let amplitude = side[0] * m.sensor.gain.signum();
+                admit(EffectId::HarmonicN, Origin::Empirical, [0.0, amplitude, 0.0, harmonic_n::scaling::DIRECTION]);
+            }
+            Motion::Rate | Motion::RateAndAcceleration => {
+                admit(EffectId::AngleLatency, Origin::Discovered, [-side[0] / m.sensor.gain, 0.0, 0.0, 0.0]);
+            }
+        }
+        h.angle_table = (!m.table.table.cos.is_empty()).then(|| m.table.table.clone());
+        h.clip = m
+            .front()
+            .filter(|r| r.rails.any())
+            .map(|r| ChannelClip { rails_v: r.rails.limits, amplitude_v: LibraryReadout::from(r).amplitude });
+        h
+    }
+}
+
+fn library_id(id: EffectId) -> &'static str {
+    id.description().id
+}

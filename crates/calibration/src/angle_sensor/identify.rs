@@ -1,0 +1,299 @@
+//! The main job for angle sensors and rate gyroscopes: runs made ready, a model selected and fitted, the held-out rows read
+//! once at the end, and a report of it all.
+
+use super::effects::{Described, deviations};
+use super::model::{Outcome, SensorModel};
+use super::rate_gyroscope::{RateGyroscope, Term};
+use super::report::{Errors, Finding, Head, report};
+use super::samples::{SensorRun, prepare};
+use super::table_fit::Sample;
+use crate::diagnostics::decomposition::{Influence, decompose};
+use crate::error::Refusal;
+use crate::estimation::statistics::median;
+use crate::identification::{Identification, Options};
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::recording::{Campaign, Instrument, RunKind};
+use crate::report::{EffectReport, Estimate, ParameterReport, Share};
+use cvg_model::effects::EffectId;
+
+/// A campaign without a pattern: an angle sensor, or the integrated output of a rate gyroscope, whose angle goes round once
+/// a turn.
+pub(crate) fn serves(campaign: &Campaign) -> bool {
+    campaign.instrument == Instrument::Sensor || is_rate_gyroscope(campaign)
+}
+
+fn is_rate_gyroscope(campaign: &Campaign) -> bool {
+    campaign.instrument == Instrument::Gyroscope
+        && campaign.period_deg == Some(360.0)
+        && campaign
+            .runs
+            .iter()
+            .all(|r| r.kind == RunKind::Rotation && r.recording.theta_deg.is_some() && r.recording.xc_v.is_none())
+}
+
+/// Harmonics of the position in the decomposition; rows that each of its unknowns needs.
+const POSITION_HARMONICS: usize = 12;
+const ROWS_PER_HARMONIC: usize = 12;
+/// Waves of the time in it at most; none faster than once a turn, because what is n per turn is position.
+const TIME_WAVES: usize = 4;
+/// Turns from which on a time is told from a position by more than a straight line.
+const TURNS_FOR_WAVES: f64 = 1.5;
+/// Rows beyond which the decomposition and the jackknife look at every so many.
+const ENOUGH_ROWS: usize = 3000;
+
+/// Identifies a campaign that [`serves`].
+///
+/// # Errors
+/// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
+pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+    let rate_gyroscope = is_rate_gyroscope(&campaign);
+    let stated = match campaign.pole_pairs {
+        Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
+        None => campaign.angular_gain,
+    };
+    let period = campaign.period_deg.unwrap_or(360.0).to_radians();
+    let head = Head::of(&campaign);
+    (options.progress)("preparing the runs");
+    let (fitted, held) = prepare(campaign)?;
+    require_a_turn(&fitted, stated.unwrap_or(1.0))?;
+    if held.iter().map(SensorRun::len).sum::<usize>() < FEWEST_HELD_ROWS {
+        return Err(Refusal::no_answer(
+            "campaign",
+            "too few rows are left to test an answer on",
+            "a longer recording, or a run with use = \"holdout\"",
+        ));
+    }
+    (options.progress)("choosing a model of the sensor");
+    let finding =
+        if rate_gyroscope { rate_finding(stated, period, &fitted)? } else { sensor_finding(stated, period, &fitted)? };
+    (options.progress)("measuring the held-out error");
+    Ok(report(head, finding, &fitted, &held, pictured))
+}
+
+/// Held-out rows below which an error says nothing.
+const FEWEST_HELD_ROWS: usize = 4;
+
+fn require_a_turn(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
+    let furthest = runs.iter().map(|r| r.travel_rad() * gain.abs()).fold(0.0, f64::max);
+    if furthest < std::f64::consts::PI {
+        let name = runs.first().map_or("campaign", |r| r.name.as_str());
+        return Err(Refusal::new(
+            name,
+            format!("the angle turns through {:.1}° only", furthest.to_degrees()),
+            "at least half a turn (180°)",
+        ));
+    }
+    Ok(())
+}
+
+fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
+    let model = SensorModel::identify(stated, period, runs)?;
+    let thinned = thinned(runs);
+    let deviations = deviations(&model, &thinned);
+    let described = Described { model: &model, deviations: &deviations };
+    let raw_turns = model.front().is_none_or(|r| {
+        let [x, y] = r.undo([0.0, 0.0]);
+        r.kind == super::readout::Kind::Plain || x.hypot(y) < r.radius
+    });
+    let declared = model.front().map(|r| r.declared(raw_turns));
+    let neutral = model.outcome == Outcome::Neutral;
+    let mut warnings = Vec::new();
+    if !raw_turns {
+        warnings.push(
+            "the readout's offsets exceed its amplitude, so that the raw angle does not turn: the ellipse was centred \
+             first, and heldout.raw is null"
+                .into(),
+        );
+    }
+    if model.by_radius {
+        warnings.push(
+            "the reference was commanded and not measured: the readout is known from the radius of its ellipse alone, and \
+             the angle errors stated are those against what was commanded"
+                .into(),
+        );
+    }
+    let gain_ratio = described.gain_ratio();
+    if gain_ratio.is_none() && !neutral {
+        warnings.push("detection_gain_ratio is null: no gain and skew were needed to predict the angle".into());
+    }
+    let samples = model.sensor.samples(&thinned, declared.as_ref());
+    Ok(Finding {
+        instrument: "sensor",
+        reason: neutral.then(|| {
+            "nothing that was found predicts rows that were not fitted better than the sensor as it is".to_owned()
+        }),
+        angular_gain: described.angular_gain(stated),
+        detection_gain_ratio: gain_ratio,
+        effects: described.effects(),
+        hypothesis: described.hypothesis(stated),
+        neutral_hypothesis: Hypothesis {
+            members: Vec::new(),
+            angle_table: None,
+            clip: None,
+            ..described.hypothesis(stated)
+        },
+        decomposition: take_apart(&samples, &thinned, model.sensor.cycles, model.sensor.gain),
+        warnings,
+        raw: raw_turns.then(|| -> Errors<'_> {
+            let sensor = model.sensor;
+            Box::new(move |run| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect())
+        }),
+        declared: {
+            let sensor = model.sensor;
+            Box::new(move |run| {
+                sensor.samples(std::slice::from_ref(run), declared.as_ref()).iter().map(|s| s.error).collect()
+            })
+        },
+        discovered: Box::new({
+            let model = model.clone();
+            move |run| model.left(run)
+        }),
+        direction: Box::new(move |run| {
+            model.sensor.samples(std::slice::from_ref(run), model.front()).iter().map(|s| s.theta).collect()
+        }),
+        period,
+    })
+}
+
+fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
+    let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
+        Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
+    })?;
+    let (gain, deviation) = model.gain;
+    let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
+    let value = sign * gain.abs();
+    let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
+    neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
+    let mut hypothesis =
+        Hypothesis { angular_gain: value, rate_bias_rad_s: model.value(Term::Bias), ..neutral_hypothesis.clone() };
+    let latency = -model.value(Term::Lag) / gain;
+    if latency != 0.0 {
+        let values = [latency, 0.0, 0.0, 0.0];
+        hypothesis.members.push(Member {
+            id: EffectId::AngleLatency,
+            values,
+            origin: Origin::Discovered,
+            refined: true,
+        });
+    }
+    let thinned = thinned(runs);
+    let samples = model.sensor.samples(&thinned, None);
+    let mut warnings = Vec::new();
+    if model.bias_varies {
+        warnings
+            .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
+    }
+    let sensor = model.sensor;
+    let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
+    Ok(Finding {
+        instrument: "gyroscope",
+        reason: (!model.answered).then(|| {
+            "bias, scale factor and lag do not predict parts of the runs that were left out better than nothing".into()
+        }),
+        angular_gain: Estimate { value, ci95: [value - T_PARTS * deviation, value + T_PARTS * deviation] },
+        detection_gain_ratio: None,
+        effects: rate_effects(&model),
+        hypothesis,
+        neutral_hypothesis,
+        decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
+        warnings,
+        raw: Some(Box::new(raw)),
+        declared: Box::new(raw),
+        discovered: Box::new(move |run| model.left(run)),
+        direction: Box::new(move |run| {
+            sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
+        }),
+        period,
+    })
+}
+
+/// Student's 97.5 % point for one fewer than five parts.
+const T_PARTS: f64 = 2.776;
+
+fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
+    if !model.answered {
+        return Vec::new();
+    }
+    let evidence = format!(
+        "left-out fifths of the runs scatter by {:.4}° with it and {:.4}° without (geometric mean); interval by jackknife",
+        model.predicted.to_degrees(),
+        model.predicted_raw.to_degrees()
+    );
+    let gain = model.gain.0;
+    let effect = |id: EffectId, origin, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
+        id: id.description().id.into(),
+        origin,
+        parameters: vec![ParameterReport {
+            name: name.into(),
+            unit: unit.into(),
+            value,
+            ci95: Some([value - T_PARTS * deviation, value + T_PARTS * deviation]),
+        }],
+        heldout_rms_deg: None,
+        evidence: format!("{}; {evidence}", id.description().signature),
+        confounded_with: Vec::new(),
+        separated_by: None,
+    };
+    let terms = model.terms.iter().filter(|t| t.1 != 0.0);
+    terms
+        .filter_map(|&(term, value, deviation)| match term {
+            Term::Bias => {
+                Some(effect(EffectId::RateOffset, Origin::Discovered, "rate_offset", "rad/s", value, deviation))
+            }
+            Term::Lag => {
+                let (value, deviation) = (-value / gain, deviation / gain.abs());
+                Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
+            }
+            // the scale factor is k
+            Term::Scale => None,
+        })
+        .collect()
+}
+
+/// Runs thinned together to what a jackknife is made on.
+fn thinned(runs: &[SensorRun]) -> Vec<SensorRun> {
+    let rows: usize = runs.iter().map(SensorRun::len).sum();
+    let stride = (rows / ENOUGH_ROWS).max(1);
+    runs.iter().map(|r| r.thinned(stride)).collect()
+}
+
+/// What the declared residual is a function of.
+fn take_apart(samples: &[Sample], runs: &[SensorRun], cycles: f64, gain: f64) -> Vec<Share> {
+    let n = samples.len();
+    let period = std::f64::consts::TAU / cycles;
+    let turns = runs.iter().map(|r| r.travel_rad() * gain.abs() / period).fold(0.0, f64::max);
+    let orders = POSITION_HARMONICS.min(n / ROWS_PER_HARMONIC).max(1);
+    let column = |f: &dyn Fn(&Sample) -> f64| samples.iter().map(f).collect::<Vec<f64>>();
+    let position = (1..=orders).flat_map(|k| {
+        let k = k as f64 * cycles;
+        [column(&|s| (k * s.theta).cos()), column(&|s| (k * s.theta).sin())]
+    });
+    let within: Vec<f64> = runs
+        .iter()
+        .flat_map(|r| {
+            let (first, length) = (r.t_s[0], (r.t_s[r.len() - 1] - r.t_s[0]).max(f64::MIN_POSITIVE));
+            r.t_s.iter().map(move |t| (t - first) / length)
+        })
+        .collect();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count, saturating")]
+    let waves = if turns > TURNS_FOR_WAVES { (turns as usize).clamp(1, TIME_WAVES) } else { 0 };
+    let time = if waves == 0 {
+        vec![within.clone()]
+    } else {
+        (1..=waves).map(|k| within.iter().map(|t| (std::f64::consts::PI * k as f64 * t).cos()).collect()).collect()
+    };
+    let mut influences =
+        vec![Influence { of: "pattern", columns: position.collect() }, Influence { of: "time", columns: time }];
+    let rates = column(&|s| s.rate);
+    let fastest = median(&mut rates.iter().map(|r| r.abs()).collect::<Vec<_>>());
+    let spread = super::samples::span(&rates);
+    if spread > 0.1 * fastest && fastest > 0.0 {
+        influences.push(Influence { of: "rate", columns: vec![rates.clone()] });
+    }
+    if rates.iter().any(|r| *r > 0.0) && rates.iter().any(|r| *r < 0.0) {
+        influences.push(Influence { of: "direction", columns: vec![column(&|s| s.rate.signum())] });
+    }
+    // each run has a constant of its own
+    let errors = super::model::by_run(samples, runs.len(), |s| s.error).concat();
+    decompose(&errors, &influences)
+}

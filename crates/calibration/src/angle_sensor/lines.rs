@@ -1,0 +1,45 @@
+//! Isolated harmonics of the reference's turn beyond the table: steps of a motor, teeth, poles. The strongest ordinate of
+//! the periodogram is taken where its false-alarm probability over all that were tried is small: ordinates of noise are
+//! exponential, and their median is ln 2 times their mean.
+
+use super::samples::span;
+use super::table_fit::{Sample, TableFit};
+use crate::estimation::statistics::median;
+
+/// False-alarm probability over all lines tried.
+const FALSE_ALARM: f64 = 0.01;
+/// Highest line that is looked for.
+const HIGHEST: u32 = 128;
+/// Fewest lines to tell noise from.
+const FEWEST: usize = 8;
+
+/// The strongest line of what a table leaves, if it is no accident. Lines go up to that which the spacing of stations
+/// resolves, and that one is included: left out, its aliases would stand in for it.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small positive counts, saturating")]
+pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_turn: f64) -> Option<u32> {
+    let reference: Vec<f64> = samples.iter().map(|s| s.reference).collect();
+    if span(&reference) < 350f64.to_radians() {
+        return None;
+    }
+    let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
+    let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    let resolved = std::f64::consts::PI / median(&mut steps).max(1e-12) + 0.01;
+    let from = (fitted.shape.order as f64 * cycles_per_turn).floor() as u32 + 1;
+    let tried: Vec<u32> = (from..=HIGHEST.min(resolved as u32)).filter(|n| !fitted.shape.lines.contains(n)).collect();
+    if tried.len() < FEWEST {
+        return None;
+    }
+    let powers: Vec<f64> = tried.iter().map(|n| power(f64::from(*n), &reference, &left)).collect();
+    let mean = median(&mut powers.clone()) / std::f64::consts::LN_2;
+    let (at, strongest) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let by_chance = -(-(-strongest / mean).exp()).ln_1p() * tried.len() as f64;
+    (-(-by_chance).exp_m1() < FALSE_ALARM).then(|| tried[at])
+}
+
+fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {
+    let (c, s) = reference.iter().zip(left).fold((0.0, 0.0), |(c, s), (a, e)| {
+        let (sin, cos) = (n * a).sin_cos();
+        (c + e * cos, s + e * sin)
+    });
+    c * c + s * s
+}

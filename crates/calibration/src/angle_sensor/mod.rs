@@ -1,0 +1,20 @@
+//! Angle sensors: two channels that read a sine and a cosine, or an angle, against a reference. Resolvers, Hall pairs,
+//! encoders, magnetometers, interferometers.
+mod autoregression;
+mod cross_validation;
+mod effects;
+mod ellipse;
+mod identify;
+mod lines;
+pub(crate) mod model;
+mod rails;
+pub(crate) mod rate_gyroscope;
+mod readout;
+mod readout_fit;
+mod report;
+mod samples;
+mod selection;
+mod sensor;
+mod table_fit;
+
+pub(crate) use identify::{identify, serves};

@@ -1,0 +1,175 @@
+//! The identified sensor: what was selected, fitted to all rows, with the checks that decide whether it is an answer.
+
+use super::cross_validation::{Candidate, Folds, Losses, choose, losses_of_radius};
+use super::rails::Rails;
+use super::readout::{Kind, Readout};
+use super::readout_fit::{Weighting, fit};
+use super::samples::SensorRun;
+use super::selection::{Selected, Selection, fit_from, starts};
+use super::sensor::Sensor;
+use super::table_fit::{Sample, Shape, TableFit};
+use super::{autoregression, ellipse};
+use crate::error::Refusal;
+
+/// Rows of the last fit; more would not narrow what still means something.
+const ENOUGH_ROWS: usize = 100_000;
+/// What an ellipse may leave of the radius, rms, where nothing else tells the readout: engineering choice.
+const LARGEST_RADIUS_ERROR: f64 = 0.25;
+
+/// Whether there is an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// errors were found, and undoing them predicts rows that were not fitted
+    Answered,
+    /// nothing was found that does
+    Neutral,
+}
+
+/// An identified sensor.
+#[derive(Debug, Clone)]
+pub(crate) struct SensorModel {
+    pub(crate) sensor: Sensor,
+    pub(crate) outcome: Outcome,
+    /// the readout, where there are channels, and how it was weighted
+    pub(crate) readout: Option<(Readout, Weighting)>,
+    pub(crate) table: TableFit,
+    /// cross-validated rms of what was selected and of the sensor as it is, rad; of the radius where the reference is
+    /// commanded
+    pub(crate) predicted: f64,
+    pub(crate) predicted_raw: Option<f64>,
+    /// the reference was not believed: only the radius was
+    pub(crate) by_radius: bool,
+}
+
+impl SensorModel {
+    /// Identifies a sensor from the runs to fit.
+    ///
+    /// # Errors
+    /// Where nothing is left that can be inverted.
+    pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Self, Refusal> {
+        let sensor = Sensor::new(stated_gain, period, runs);
+        if runs.iter().all(|r| r.commanded && r.channels().is_some()) {
+            return Self::by_radius(sensor, runs);
+        }
+        let believed: Vec<SensorRun> = runs.iter().filter(|r| !r.commanded).cloned().collect();
+        let runs = if believed.is_empty() { runs } else { &believed };
+        let sensor = Sensor::new(stated_gain, period, runs);
+        let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
+        let starts = starts(runs, sensor.gain);
+        let selected = Selection::new(&sensor, runs, rails, &starts).select();
+        let refusal = || {
+            Refusal::no_answer(
+                "campaign",
+                "no model of the sensor can be told from its rows",
+                "more stations, or a longer recording",
+            )
+        };
+        let selected = selected.ok_or_else(refusal)?;
+        let rows: usize = runs.iter().map(SensorRun::len).sum();
+        let stride = (rows / ENOUGH_ROWS).max(1);
+        let thinned: Vec<SensorRun> = runs.iter().map(|r| r.thinned(stride)).collect();
+        Self::fitted(sensor, &selected, &thinned, rails, &starts).ok_or_else(refusal)
+    }
+
+    fn fitted(
+        sensor: Sensor,
+        selected: &Selected,
+        runs: &[SensorRun],
+        rails: Rails,
+        starts: &[Readout],
+    ) -> Option<Self> {
+        let (front, shape) = &selected.model;
+        let readout = match front {
+            None => None,
+            Some((Kind::Plain, weighting)) => Some((Readout { rails, ..Readout::plain() }, *weighting)),
+            Some((kind, weighting)) => {
+                Some((fit_from(starts, rails, *kind, *weighting, runs, sensor.gain)?.readout, *weighting))
+            }
+        };
+        let samples = sensor.samples(runs, readout.as_ref().map(|r| &r.0));
+        let table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
+        let plain = sensor.samples(runs, None);
+        let gain = autoregression::gain(
+            &by_run(&plain, runs.len(), |s| s.error),
+            &by_run(&samples, runs.len(), |s| table.left(s)),
+            selected.size,
+        );
+        let (predicted, predicted_raw) = (selected.losses.rms(), selected.raw.as_ref().map(Losses::rms));
+        let helps = predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
+        let model =
+            Self { sensor, outcome: Outcome::Answered, readout, table, predicted, predicted_raw, by_radius: false };
+        Some(if helps { model } else { model.neutral(runs) })
+    }
+
+    /// The sensor as it is.
+    fn neutral(self, runs: &[SensorRun]) -> Self {
+        let shape = Shape::constant(self.sensor.free_gain);
+        let samples = self.sensor.samples(runs, None);
+        let table = TableFit::new(&shape, &samples, runs.len(), self.sensor.cycles).unwrap_or(self.table);
+        let readout = self.readout.map(|(_, w)| (Readout::plain(), w));
+        Self { outcome: Outcome::Neutral, readout, table, ..self }
+    }
+
+    /// The readout from the radius alone: of a commanded reference nobody knows what the table did with it.
+    fn by_radius(sensor: Sensor, runs: &[SensorRun]) -> Result<Self, Refusal> {
+        let refuse = |what: String| Refusal::no_answer("campaign", what, "two channels that draw an ellipse");
+        let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
+        let start = ellipse::algebraic(runs).ok_or_else(|| refuse("the channels draw no ellipse".into()))?;
+        let start = Readout { rails, ..start };
+        let folds = Folds::interleaved(runs);
+        let candidates: Vec<Candidate<Kind>> = [Kind::Offset, Kind::Affine]
+            .into_iter()
+            .filter_map(|kind| {
+                let without = |fold: usize| {
+                    let kept = folds.without(runs, fold);
+                    fit(kind, Weighting::Radius, &kept, sensor.gain, &start).map(|f| f.readout)
+                };
+                let losses = losses_of_radius(without, &folds, runs)?;
+                Some(Candidate { size: kind.free().len(), model: kind, losses })
+            })
+            .collect();
+        let chosen = choose(&candidates).ok_or_else(|| refuse("no ellipse fits the channels".into()))?;
+        if chosen.losses.rms() > LARGEST_RADIUS_ERROR {
+            return Err(refuse(format!("the best ellipse leaves {:.2} of the radius", chosen.losses.rms())));
+        }
+        let fitted = fit(chosen.model, Weighting::Radius, runs, sensor.gain, &start);
+        let readout = fitted.ok_or_else(|| refuse("no ellipse fits the channels".into()))?.readout;
+        let samples = sensor.samples(runs, Some(&readout));
+        let shape = Shape::constant(false);
+        let table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)
+            .ok_or_else(|| refuse("the angle cannot be followed".into()))?;
+        Ok(Self {
+            sensor,
+            outcome: Outcome::Answered,
+            readout: Some((readout, Weighting::Radius)),
+            table,
+            predicted: chosen.losses.rms(),
+            predicted_raw: None,
+            by_radius: true,
+        })
+    }
+
+    /// The readout alone.
+    pub(crate) fn front(&self) -> Option<&Readout> {
+        self.readout.as_ref().map(|r| &r.0)
+    }
+
+    /// Error of a run with what was found undone, followed through its period, about its median.
+    pub(crate) fn left(&self, run: &SensorRun) -> Vec<f64> {
+        let samples = self.sensor.samples(std::slice::from_ref(run), self.front());
+        samples.iter().map(|s| self.table.left(s)).collect()
+    }
+}
+
+/// A value of the samples of each run.
+pub(crate) fn by_run(samples: &[Sample], runs: usize, value: impl Fn(&Sample) -> f64) -> Vec<Vec<f64>> {
+    let mut out = vec![Vec::new(); runs];
+    for s in samples {
+        out[s.run].push(value(s));
+    }
+    for v in &mut out {
+        let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
+        v.iter_mut().for_each(|x| *x -= mean);
+    }
+    out
+}

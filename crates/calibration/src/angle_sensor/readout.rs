@@ -1,0 +1,174 @@
+//! The readout of two channels, in the order of the electronics: plates (cubic), axes (skew), amplifier (gain), offset,
+//! converter (rails). All parameters but the centre are relative to the amplitude, so that volts, millivolts and counts
+//! give the same answer.
+//!
+//! $$x_d = o_x + A\\,c_x(\cos θ), \quad y_d = o_y + A g\\,(c_y(\sin θ) + s\\,c_x(\cos θ)), \quad
+//! c(u) = u\\,(1 + κ(u^2 - \tfrac34))$$
+//!
+//! The −¾ keeps the fundamental of c: κ does not change what g and A mean.
+
+use super::rails::Rails;
+
+/// Which of the parameters are there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Kind {
+    /// the channels are taken as they are
+    Plain,
+    /// offsets
+    Offset,
+    /// offsets, gain and skew
+    Affine,
+    /// and a cubic, common to both channels
+    Cubic,
+    /// and a cubic for each channel
+    CubicPerChannel,
+}
+
+/// Unknowns of a readout: offsets x, y, ln of the gain ratio, skew, cubics of x and y.
+pub(crate) const UNKNOWNS: usize = 6;
+
+impl Kind {
+    /// Indices of the parameters that are adjusted.
+    pub(crate) fn free(self) -> &'static [usize] {
+        match self {
+            Self::Plain => &[],
+            Self::Offset => &[0, 1],
+            Self::Affine => &[0, 1, 2, 3],
+            Self::Cubic => &[0, 1, 2, 3, 4],
+            Self::CubicPerChannel => &[0, 1, 2, 3, 4, 5],
+        }
+    }
+}
+
+/// Largest ratio of the axes of an ellipse that still has an angle: engineering choice.
+pub(crate) const LARGEST_AXES_RATIO: f64 = 30.0;
+/// Largest skew and cubic that leave a readout with an inverse: beyond, c(u) turns back within the circle.
+const LARGEST_SKEW: f64 = 5.0;
+const LARGEST_CUBIC: f64 = 0.4;
+/// Newton steps of the inverse of c.
+const NEWTON_STEPS: usize = 5;
+
+/// A readout of two channels.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Readout {
+    pub(crate) kind: Kind,
+    /// what offsets are counted from, in the unit of the channels
+    pub(crate) centre: [f64; 2],
+    /// amplitude of x, in the unit of the channels
+    pub(crate) amplitude: f64,
+    /// the converters' rails
+    pub(crate) rails: Rails,
+    /// mean radius of the points behind the readings: near 1, by how the parameters moved since `amplitude` was taken
+    pub(crate) radius: f64,
+    /// o_x, o_y in amplitudes, ln g, s, κ_x, κ_y
+    pub(crate) p: [f64; UNKNOWNS],
+}
+
+impl Readout {
+    /// The channels as they are.
+    pub(crate) fn plain() -> Self {
+        Self {
+            kind: Kind::Plain,
+            centre: [0.0; 2],
+            amplitude: 1.0,
+            rails: Rails::none(),
+            radius: 1.0,
+            p: [0.0; UNKNOWNS],
+        }
+    }
+
+    /// Offset, gain ratio and skew.
+    pub(crate) fn affine(centre: [f64; 2], amplitude: f64, gain: f64, skew: f64) -> Self {
+        Self { kind: Kind::Affine, centre, amplitude, p: [0.0, 0.0, gain.ln(), skew, 0.0, 0.0], ..Self::plain() }
+    }
+
+    /// The readout begun as another kind: parameters that the kind lacks are neutral.
+    pub(crate) fn of_kind(&self, kind: Kind) -> Self {
+        if kind == Kind::Plain {
+            return Self { rails: self.rails, ..Self::plain() };
+        }
+        let free = kind.free();
+        let p = std::array::from_fn(|i| if free.contains(&i) { self.p[i] } else { 0.0 });
+        Self { kind, p, ..self.clone() }
+    }
+
+    /// What the paper's model has of it: the gain ratio, and the centre only where there is no angle without it.
+    pub(crate) fn declared(&self, raw_turns: bool) -> Self {
+        let mut out = Self { p: [0.0; UNKNOWNS], ..self.clone() };
+        out.p[2] = self.p[2];
+        if raw_turns {
+            out.centre = [0.0; 2];
+        } else {
+            (out.p[0], out.p[1]) = (self.p[0], self.p[1]);
+        }
+        out
+    }
+
+    /// κ of either channel.
+    pub(crate) fn cubics(&self) -> [f64; 2] {
+        [self.p[4], if self.kind == Kind::CubicPerChannel { self.p[5] } else { self.p[4] }]
+    }
+
+    /// The point on the unit circle behind a reading, rails not regarded.
+    #[inline]
+    pub(crate) fn undo(&self, z: [f64; 2]) -> [f64; 2] {
+        let p = &self.p;
+        let x = (z[0] - self.centre[0]) / self.amplitude - p[0];
+        let y = ((z[1] - self.centre[1]) / self.amplitude - p[1]) / p[2].exp() - p[3] * x;
+        let [kx, ky] = self.cubics();
+        [without_cubic(x, kx), without_cubic(y, ky)]
+    }
+
+    /// The angle behind a reading, rad. A channel at its rail says only "at least": the other one and the radius tell.
+    pub(crate) fn angle(&self, z: [f64; 2]) -> f64 {
+        let [mut x, mut y] = self.undo(z);
+        match self.rails.reached(z) {
+            [true, false] => x = x.signum() * (self.radius.powi(2) - y * y).max(0.0).sqrt().max(x.abs()),
+            [false, true] => y = y.signum() * (self.radius.powi(2) - x * x).max(0.0).sqrt().max(y.abs()),
+            _ => {}
+        }
+        y.atan2(x)
+    }
+
+    /// The parameters leave an ellipse with an angle and a cubic with an inverse.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.p.iter().all(|v| v.is_finite())
+            && self.p[2].abs() < LARGEST_AXES_RATIO.ln()
+            && self.p[3].abs() < LARGEST_SKEW
+            && self.cubics().iter().all(|k| k.abs() < LARGEST_CUBIC)
+    }
+}
+
+/// The root x of v = x (1 + κ(x² − ¾)) by Newton's iteration; beyond the circle the slope is taken as on it.
+#[inline]
+fn without_cubic(v: f64, kappa: f64) -> f64 {
+    if kappa == 0.0 {
+        return v;
+    }
+    let mut x = v;
+    for _ in 0..NEWTON_STEPS {
+        let square = (x * x).min(4.0);
+        let slope = (1.0 + kappa * (3.0 * square - 0.75)).max(0.2);
+        x -= (x * (1.0 + kappa * (square - 0.75)) - v) / slope;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_readout_is_undone_in_the_order_of_the_electronics() {
+        let mut readout = Readout::affine([300.0, -70.0], 500.0, 1.1, 0.04).of_kind(Kind::CubicPerChannel);
+        (readout.p[0], readout.p[4], readout.p[5]) = (0.02, 0.05, -0.03);
+        let c = |u: f64, k: f64| u * (1.0 + k * (u * u - 0.75));
+        for i in 0..64 {
+            let theta = f64::from(i) * 0.1;
+            let (x, y) = (c(theta.cos(), 0.05), c(theta.sin(), -0.03));
+            let z = [300.0 + 500.0 * (0.02 + x), -70.0 + 500.0 * 1.1 * (y + 0.04 * x)];
+            let off = crate::data::track::wrapped(readout.angle(z) - theta, std::f64::consts::TAU);
+            assert!(off.abs() < 1e-9, "{theta}: {off}");
+        }
+    }
+}

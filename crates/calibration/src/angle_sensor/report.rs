@@ -1,0 +1,333 @@
+//! The report of a sensor or a rate gyroscope: the held-out error at each stage, what is left, and the facts of what was
+//! found, in the form that all instruments share.
+
+use super::samples::SensorRun;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::picture::{Picture, picture_of};
+use crate::diagnostics::residual::{
+    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
+};
+use crate::estimation::fit::Residual;
+use crate::estimation::statistics::median;
+use crate::identification::{BiasCurve, Figures, Identification, run_report};
+use crate::model::hypothesis::{Hypothesis, Origin};
+use crate::recording::Campaign;
+use crate::report::calibration::Calibration;
+use crate::report::provenance;
+use crate::report::stages::stages;
+use crate::report::{
+    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, Share, Status, StepReport, Tool,
+    Unexplained,
+};
+
+/// Errors of a run at one stage, rad.
+pub(crate) type Errors<'a> = Box<dyn Fn(&SensorRun) -> Vec<f64> + 'a>;
+
+/// What an identification found, with the errors that it leaves of any run.
+pub(crate) struct Finding<'a> {
+    pub(crate) instrument: &'static str,
+    /// why nothing is undone, where nothing is
+    pub(crate) reason: Option<String>,
+    pub(crate) angular_gain: Estimate,
+    pub(crate) detection_gain_ratio: Option<Estimate>,
+    pub(crate) effects: Vec<EffectReport>,
+    /// what a compensation undoes, and the same without anything to undo
+    pub(crate) hypothesis: Hypothesis,
+    pub(crate) neutral_hypothesis: Hypothesis,
+    pub(crate) decomposition: Vec<Share>,
+    pub(crate) warnings: Vec<String>,
+    /// the error as recorded; none where the raw angle does not turn
+    pub(crate) raw: Option<Errors<'a>>,
+    pub(crate) declared: Errors<'a>,
+    pub(crate) discovered: Errors<'a>,
+    /// the angle that the error is shown against
+    pub(crate) direction: Errors<'a>,
+    /// period of the angle, rad
+    pub(crate) period: f64,
+}
+
+/// What the campaign says of itself, kept while its recordings are taken apart.
+pub(crate) struct Head {
+    device: String,
+    runs: Vec<RunReport>,
+    inputs: Vec<Input>,
+    warnings: Vec<String>,
+}
+
+impl Head {
+    pub(crate) fn of(campaign: &Campaign) -> Self {
+        Self {
+            device: campaign.device.clone(),
+            runs: campaign.runs.iter().map(run_report).collect(),
+            inputs: provenance::inputs(campaign),
+            warnings: campaign.runs.iter().flat_map(|r| r.recording.warnings.iter().cloned()).collect(),
+        }
+    }
+}
+
+/// Points of one curve.
+const CURVE_POINTS: usize = 2000;
+/// Reference steps below which differences of neighbours are noise, rad; and how near stations count as one, rad.
+const DENSE_STEP: f64 = 0.035;
+const SAME_STATION: f64 = 1e-3;
+/// Pairs of repeated stations that a noise floor needs.
+const FEWEST_PAIRS: usize = 10;
+
+/// Reads the held-out rows, once, and reports.
+pub(crate) fn report(
+    head: Head,
+    finding: Finding<'_>,
+    fitted: &[SensorRun],
+    held: &[SensorRun],
+    pictured: bool,
+) -> Identification {
+    let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
+        let segments = runs.iter().map(|r| segment(r, errors(r), &finding)).collect();
+        Evaluation::of_segments(segments, like)
+    };
+    let mut after = evaluate(&finding.discovered, held, None);
+    let raw = finding.raw.as_ref().map(|raw| evaluate(raw, held, Some(&after)));
+    let mut declared = evaluate(&finding.declared, held, Some(&after));
+    let mut reason = finding.reason.clone();
+    let worse = |e: &Evaluation| raw.as_ref().is_some_and(|raw| e.size().rms_deg > raw.size().rms_deg);
+    if reason.is_none() && worse(&after) {
+        let sizes = [Some(&after), raw.as_ref()].map(|e| e.map_or(f64::NAN, |e| e.size().rms_deg));
+        reason = Some(format!(
+            "what was found does not help on held-out data: it leaves {:.4}°, and nothing undone leaves {:.4}°",
+            sizes[0], sizes[1]
+        ));
+    }
+    let neutral = reason.is_some();
+    if neutral && let Some(raw) = &raw {
+        (after, declared) = (raw.clone(), raw.clone());
+    }
+    let on_fit = evaluate(
+        if neutral { finding.raw.as_ref().unwrap_or(&finding.discovered) } else { &finding.discovered },
+        fitted,
+        None,
+    );
+    let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
+    let white = ljung_box(&correlation, on_fit.errors().count()) >= WHITENESS_LEVEL;
+    let floor = noise_floor(&after, held);
+    let mut effects = if neutral { Vec::new() } else { finding.effects.clone() };
+    for e in effects.iter_mut().filter(|e| e.origin != Origin::Declared) {
+        e.heldout_rms_deg =
+            Some(crate::report::BeforeAfter { before: declared.size().rms_deg, after: after.size().rms_deg });
+    }
+    let mut warnings = head.warnings.clone();
+    warnings.extend(finding.warnings.iter().cloned());
+    let spikes = on_fit.spikes() + after.spikes();
+    if spikes > 0 {
+        warnings.push(format!("{spikes} samples were set aside as spikes"));
+    }
+    let mut steps = stages(raw.as_ref(), &declared, &after, &[]);
+    steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, &after)));
+    let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
+    let picture = pictured.then(|| picture(&names, raw.as_ref(), &declared, &after, &finding));
+    let report = Report {
+        schema: SCHEMA.into(),
+        status: if neutral { Status::Neutral } else { Status::Answered },
+        reason,
+        tool: Tool::default(),
+        inputs: head.inputs.clone(),
+        device: head.device.clone(),
+        instrument: finding.instrument.into(),
+        angular_gain: finding.angular_gain,
+        detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
+        actuation_gain_ratio: None,
+        unexplained: described(&effects),
+        effects,
+        heldout: Heldout {
+            raw: raw.as_ref().map(Evaluation::size),
+            declared: declared.size(),
+            discovered: after.size(),
+            noise_floor_deg: floor.to_degrees(),
+        },
+        steps,
+        residual: ResidualReport {
+            harmonics: [Follows::Pattern, Follows::Table]
+                .into_iter()
+                .flat_map(|of| reported_harmonics(&after, of, &after))
+                .collect(),
+            white,
+        },
+        channels: Vec::new(),
+        runs: runs(&head, fitted, held, &on_fit, &after),
+        decomposition: finding.decomposition.clone(),
+        proposals: Vec::new(),
+        warnings,
+    };
+    let figures =
+        Figures { bias: curves(held, raw.as_ref(), &declared, &after, finding.period), ring_downs: Vec::new() };
+    let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
+    let calibration = Calibration { device: head.device, hypothesis };
+    Identification { report, calibration, figures, steps: Vec::new(), picture }
+}
+
+/// A run's errors as the residual diagnostics take them.
+fn segment(run: &SensorRun, errors: Vec<f64>, finding: &Finding<'_>) -> Residual {
+    let gain = finding.hypothesis.sense() * finding.hypothesis.angular_gain;
+    Residual {
+        track: run.number,
+        samples: run.len(),
+        t_s: run.t_s.clone(),
+        turned: run.reference_rad.iter().map(|a| a - run.reference_rad[0]).collect(),
+        table: run.reference_rad.clone(),
+        direction: (finding.direction)(run),
+        precession: run.rate_rad_s.iter().map(|w| gain * w).collect(),
+        angle: errors,
+        amplitude: vec![0.0; run.len()],
+    }
+}
+
+/// The white part of the error where the rows stand densely; else the repeatability of stations that were met more than
+/// once; else all that is left. It is never more than that.
+fn noise_floor(after: &Evaluation, held: &[SensorRun]) -> f64 {
+    let all = after.mean_square().sqrt();
+    let mut steps: Vec<f64> =
+        held.iter().flat_map(|r| r.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs())).collect();
+    if median(&mut steps) < DENSE_STEP {
+        return after.noise_floor().min(all);
+    }
+    let mut stations: Vec<(f64, f64)> = after
+        .segments
+        .iter()
+        .flat_map(|s| s.table.iter().zip(&s.angle).map(|(a, e)| (a.rem_euclid(std::f64::consts::TAU), *e)))
+        .collect();
+    stations.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let pairs: Vec<f64> = stations
+        .windows(2)
+        .filter(|w| w[1].0 - w[0].0 < SAME_STATION)
+        .map(|w| 0.5 * (w[1].1 - w[0].1).powi(2))
+        .collect();
+    if pairs.len() < FEWEST_PAIRS {
+        return all;
+    }
+    (pairs.iter().sum::<f64>() / pairs.len() as f64).sqrt().min(all)
+}
+
+fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
+    StepReport {
+        stage: if e.origin == Origin::Discovered { "discovered".into() } else { "empirical".into() },
+        effect: Some(e.id.clone()),
+        heldout: after.size(),
+        harmonics: reported_harmonics(after, Follows::Pattern, after),
+        signature: None,
+        gain: None,
+        rivals: Vec::new(),
+        energy_balance: None,
+        doubt: None,
+    }
+}
+
+/// What was corrected without a known cause.
+fn described(effects: &[EffectReport]) -> Vec<Unexplained> {
+    let mut out = Vec::new();
+    let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
+    let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
+        out.push(Unexplained {
+            class: class.into(),
+            n,
+            frequency_hz: None,
+            rms_deg: (amplitude / std::f64::consts::SQRT_2).to_degrees(),
+            suggestion: suggestion.into(),
+        });
+    };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small harmonic number")]
+    for e in effects.iter().filter(|e| e.origin == Origin::Empirical) {
+        match e.id.as_str() {
+            "angle-table" => {
+                for pair in e.parameters.chunks(2) {
+                    let [c, s] = pair else { continue };
+                    let seen = |p: &crate::report::ParameterReport| p.ci95.is_some_and(|i| i[0] > 0.0 || i[1] < 0.0);
+                    if seen(c) || seen(s) {
+                        let n = c.name.trim_start_matches("cos_").parse().ok();
+                        add(
+                            "pattern-harmonic",
+                            n,
+                            c.value.hypot(s.value),
+                            "corrected as part of the angle table; record the two channels, which tell offset, gain and skew \
+                             from the rest",
+                        );
+                    }
+                }
+            }
+            "table-harmonic" => add(
+                "table-harmonic",
+                Some(value(e, "n") as u32),
+                value(e, "amplitude"),
+                "corrected as a line of the reference's turn on these data; it is not carried into the calibration",
+            ),
+            "harmonic-n" => add(
+                "rate-dependent",
+                Some(0),
+                std::f64::consts::SQRT_2 * value(e, "amplitude").abs(),
+                "corrected as a constant that changes sign with the direction; runs at two speeds tell a lag from play",
+            ),
+            _ => add("rate-dependent", None, 0.0, "corrected as an error in proportion to the acceleration"),
+        }
+    }
+    out
+}
+
+fn runs(
+    head: &Head,
+    fitted: &[SensorRun],
+    held: &[SensorRun],
+    on_fit: &Evaluation,
+    after: &Evaluation,
+) -> Vec<RunReport> {
+    let mut out = head.runs.clone();
+    let both = fitted.iter().zip(&on_fit.segments).zip(&on_fit.kept).map(|x| (x, true));
+    for (((run, s), kept), is_fit) in both.chain(held.iter().zip(&after.segments).zip(&after.kept).map(|x| (x, false)))
+    {
+        let Some(r) = out.get_mut(run.number) else { continue };
+        let n = run.len() - 1;
+        r.rate_dps = Some(((run.reference_rad[n] - run.reference_rad[0]) / (run.t_s[n] - run.t_s[0])).to_degrees());
+        r.spikes += kept.iter().filter(|k| !**k).count();
+        let own = Evaluation { segments: vec![s.clone()], kept: vec![kept.clone()] };
+        r.rms_deg = Some(own.size().rms_deg);
+        let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
+        r.r#use = match (shared, is_fit) {
+            (true, _) => "fit, last quarter held out".into(),
+            (false, true) => "fit".into(),
+            (false, false) => "holdout".into(),
+        };
+    }
+    out
+}
+
+fn curves(
+    held: &[SensorRun],
+    raw: Option<&Evaluation>,
+    declared: &Evaluation,
+    after: &Evaluation,
+    period: f64,
+) -> Vec<BiasCurve> {
+    held.iter()
+        .enumerate()
+        .map(|(i, run)| {
+            let s = &after.segments[i];
+            let stride = (s.angle.len() / CURVE_POINTS).max(1);
+            let shown: Vec<usize> = (0..s.angle.len()).step_by(stride).filter(|&k| after.kept[i][k]).collect();
+            let of = |e: &Evaluation| shown.iter().map(|&k| e.segments[i].angle[k].to_degrees()).collect();
+            BiasCurve {
+                name: run.name.clone(),
+                pattern_deg: shown.iter().map(|&k| s.direction[k].rem_euclid(period).to_degrees()).collect(),
+                raw_deg: raw.map(of).unwrap_or_default(),
+                declared_deg: of(declared),
+                discovered_deg: of(after),
+            }
+        })
+        .collect()
+}
+
+fn picture(
+    names: &[String],
+    raw: Option<&Evaluation>,
+    declared: &Evaluation,
+    after: &Evaluation,
+    finding: &Finding<'_>,
+) -> Picture {
+    picture_of(names, raw, declared, after, &finding.hypothesis)
+}

@@ -1,0 +1,223 @@
+//! The runs of an angle sensor made ready: what the reference did, what the channels read, and which rows serve for what.
+//! Immutable once built: selection and estimation look at it through lists of rows.
+
+use std::f64::consts::TAU;
+
+use crate::data::track::wrapped;
+use crate::error::Refusal;
+use crate::recording::{Campaign, Reference, Role, Run};
+
+/// What one run recorded of the instrument.
+#[derive(Debug, Clone)]
+pub(crate) enum Reading {
+    /// the instrument's own angle, rad
+    Angle(Vec<f64>),
+    /// two channels that read the cosine and the sine, in any unit
+    Channels(Vec<[f64; 2]>),
+}
+
+/// A run, or the part of one that serves one purpose.
+#[derive(Debug, Clone)]
+pub(crate) struct SensorRun {
+    /// name of the run, for messages
+    pub(crate) name: String,
+    /// index in the campaign
+    pub(crate) number: usize,
+    /// what it is used for
+    pub(crate) role: Role,
+    /// the reference is what was asked for and not what was measured
+    pub(crate) commanded: bool,
+    /// time, s
+    pub(crate) t_s: Vec<f64>,
+    /// reference angle, unwrapped, rad
+    pub(crate) reference_rad: Vec<f64>,
+    /// its rate, rad/s
+    pub(crate) rate_rad_s: Vec<f64>,
+    /// its acceleration, rad/s²
+    pub(crate) acceleration_rad_s2: Vec<f64>,
+    /// what the instrument read
+    pub(crate) reading: Reading,
+}
+
+/// Share of a run, in time, that is fitted where no run is held out.
+const FITTED_SHARE: f64 = 0.75;
+/// Rows below which a run tells nothing.
+const FEWEST_ROWS: usize = 8;
+
+impl SensorRun {
+    fn new(run: Run, number: usize, stated: Option<Reference>) -> Result<Self, Refusal> {
+        let settled = run.settled()?;
+        let name = run.file.display().to_string();
+        let r = run.recording;
+        let t_s = r.t_s[settled.clone()].to_vec();
+        let (reference_rad, measured) = match (&r.table_deg, &r.rate_dps) {
+            (Some(table), _) => (unwrapped(table[settled.clone()].iter().map(|d| d.to_radians()), TAU), true),
+            (None, Some(rate)) => {
+                let rate = &rate[settled.clone()];
+                (integrated(&t_s, rate), rate.iter().any(|w| *w != rate[0]))
+            }
+            (None, None) => return Err(Refusal::new(&name, "there is no reference", "rate_dps or table_deg")),
+        };
+        let reading = match (&r.xc_v, &r.yc_v, &r.theta_deg) {
+            (Some(x), Some(y), _) => Reading::Channels(settled.clone().map(|i| [x[i], y[i]]).collect()),
+            (_, _, Some(theta)) => Reading::Angle(settled.clone().map(|i| theta[i].to_radians()).collect()),
+            _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
+        };
+        let rate_rad_s = gradient(&reference_rad, &t_s);
+        let acceleration_rad_s2 = gradient(&rate_rad_s, &t_s);
+        let commanded = stated.map_or(!measured, |s| s == Reference::Commanded);
+        Ok(Self {
+            name,
+            number,
+            role: run.role,
+            commanded,
+            t_s,
+            reference_rad,
+            rate_rad_s,
+            acceleration_rad_s2,
+            reading,
+        })
+    }
+
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// The rows `kept` as a run of their own.
+    pub(crate) fn subset(&self, kept: &[usize]) -> Self {
+        let pick = |v: &[f64]| kept.iter().map(|&i| v[i]).collect();
+        Self {
+            name: self.name.clone(),
+            t_s: pick(&self.t_s),
+            reference_rad: pick(&self.reference_rad),
+            rate_rad_s: pick(&self.rate_rad_s),
+            acceleration_rad_s2: pick(&self.acceleration_rad_s2),
+            reading: match &self.reading {
+                Reading::Angle(theta) => Reading::Angle(pick(theta)),
+                Reading::Channels(v) => Reading::Channels(kept.iter().map(|&i| v[i]).collect()),
+            },
+            ..*self
+        }
+    }
+
+    /// Every `stride`-th row.
+    pub(crate) fn thinned(&self, stride: usize) -> Self {
+        self.subset(&(0..self.len()).step_by(stride.max(1)).collect::<Vec<_>>())
+    }
+
+    /// How far the reference turns in all, rad.
+    pub(crate) fn travel_rad(&self) -> f64 {
+        span(&self.reference_rad)
+    }
+
+    /// The channels, where it has them.
+    pub(crate) fn channels(&self) -> Option<&[[f64; 2]]> {
+        match &self.reading {
+            Reading::Channels(v) => Some(v),
+            Reading::Angle(_) => None,
+        }
+    }
+}
+
+/// Makes the rotation runs of a campaign ready: those to fit, and those held out. Where none is held out, the last
+/// quarter in time of each is.
+///
+/// # Errors
+/// Where a run has no reference or nothing to fit is left.
+pub(crate) fn prepare(campaign: Campaign) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
+    let stated = campaign.reference;
+    let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::new(r, i, stated));
+    let runs: Vec<SensorRun> = runs.collect::<Result<_, _>>()?;
+    let (fit, held): (Vec<_>, Vec<_>) = if runs.iter().any(|r| r.role == Role::Holdout) {
+        runs.into_iter().partition(|r| r.role == Role::Fit)
+    } else {
+        runs.iter().map(last_quarter_apart).unzip()
+    };
+    let fit: Vec<_> = fit.into_iter().filter(|r| r.len() >= FEWEST_ROWS).collect();
+    if fit.is_empty() {
+        return Err(Refusal::no_answer(
+            "campaign",
+            format!("no run has {FEWEST_ROWS} rows to fit"),
+            "a longer recording",
+        ));
+    }
+    Ok((fit, held.into_iter().filter(|r| r.len() > 1).collect()))
+}
+
+fn last_quarter_apart(run: &SensorRun) -> (SensorRun, SensorRun) {
+    let (first, last) = (run.t_s[0], run.t_s[run.len() - 1]);
+    let cut = run.t_s.partition_point(|t| *t < first + FITTED_SHARE * (last - first));
+    let rows: Vec<usize> = (0..run.len()).collect();
+    (run.subset(&rows[..cut]), SensorRun { role: Role::Holdout, ..run.subset(&rows[cut..]) })
+}
+
+/// An angle of any wrapping as a continuous one: each step is the shortest of the period.
+pub(crate) fn unwrapped(angles: impl Iterator<Item = f64>, period: f64) -> Vec<f64> {
+    let mut out: Vec<f64> = Vec::with_capacity(angles.size_hint().0);
+    for raw in angles {
+        let last = out.last().copied().unwrap_or(raw);
+        out.push(last + wrapped(raw - last, period));
+    }
+    out
+}
+
+/// Largest less smallest.
+pub(crate) fn span(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    if high > low { high - low } else { 0.0 }
+}
+
+/// ∫ rate dt by the trapezoidal rule, rad, from rates in deg/s.
+fn integrated(t_s: &[f64], rate_dps: &[f64]) -> Vec<f64> {
+    let mut angle = 0.0;
+    (0..t_s.len())
+        .map(|i| {
+            if i > 0 {
+                angle += 0.5 * (rate_dps[i] + rate_dps[i - 1]).to_radians() * (t_s[i] - t_s[i - 1]);
+            }
+            angle
+        })
+        .collect()
+}
+
+/// Derivative over uneven steps: second order inside, first order at the ends.
+fn gradient(y: &[f64], t: &[f64]) -> Vec<f64> {
+    let n = y.len();
+    let slope = |i: usize, j: usize| (y[j] - y[i]) / (t[j] - t[i]).max(f64::MIN_POSITIVE);
+    (0..n)
+        .map(|i| match i {
+            _ if n < 2 => 0.0,
+            0 => slope(0, 1),
+            _ if i == n - 1 => slope(n - 2, n - 1),
+            _ => {
+                let (before, after) = (t[i] - t[i - 1], t[i + 1] - t[i]);
+                (slope(i - 1, i) * after + slope(i, i + 1) * before) / (before + after).max(f64::MIN_POSITIVE)
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gradient_of_a_parabola_over_uneven_steps_is_its_slope() {
+        let t = [0.0, 0.1, 0.35, 0.5, 0.9];
+        let y: Vec<f64> = t.iter().map(|t| 3.0 * t * t).collect();
+        for (i, slope) in gradient(&y, &t).iter().enumerate().take(4).skip(1) {
+            assert!((slope - 6.0 * t[i]).abs() < 1e-12, "{slope}");
+        }
+    }
+
+    #[test]
+    fn an_angle_of_any_wrapping_is_continuous() {
+        let wrapped = (0..100).map(|i| (f64::from(i) * 0.7).rem_euclid(TAU));
+        for (i, a) in unwrapped(wrapped, TAU).iter().enumerate() {
+            #[allow(clippy::cast_precision_loss, reason = "a hundred")]
+            let expected = i as f64 * 0.7;
+            assert!((a - expected).abs() < 1e-9);
+        }
+    }
+}

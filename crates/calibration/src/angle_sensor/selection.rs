@@ -1,0 +1,241 @@
+//! Which model of an angle sensor: readout, table, motion and lines, chosen by blocked cross-validation within the data to
+//! fit. The held-out runs are not seen here.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::cross_validation::{Candidate, Folds, Losses, choose, cross_validate};
+use super::ellipse;
+use super::lines::strongest_line;
+use super::rails::Rails;
+use super::readout::{Kind, Readout};
+use super::readout_fit::{ReadoutFit, Weighting, fit};
+use super::samples::{Reading, SensorRun, span};
+use super::sensor::Sensor;
+use super::table_fit::{Motion, Sample, Shape, TableFit};
+use crate::model::angle_table::Form;
+
+/// Lengths of the table that are offered: nested, so that the order of trial has no say.
+pub(crate) const ORDERS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32];
+/// Lengths with which readouts are compared, and with which the following of motion is settled.
+const COARSE_ORDERS: [usize; 2] = [0, 4];
+const MOTION_ORDERS: [usize; 2] = [4, 12];
+/// Lengths offered anew beside an isolated line go up to this.
+const ORDER_BESIDE_LINES: usize = 12;
+/// Rows that a model needs for each of its unknowns: with 34 rows it allows offset, gain, skew and two harmonics.
+const ROWS_PER_UNKNOWN: usize = 4;
+/// Rows beyond which selection looks at every so many only.
+const ENOUGH_ROWS: usize = 1500;
+/// Readouts that are offered every length of the table.
+const FINALISTS: usize = 3;
+/// Isolated lines at most.
+const MOST_LINES: usize = 6;
+/// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
+const VARYING_RATE: f64 = 0.02;
+
+/// A readout as it is fitted.
+pub(crate) type Front = (Kind, Weighting);
+/// A model: a readout, where there are channels, and a table.
+pub(crate) type Model = (Option<Front>, Shape);
+
+/// What was chosen.
+#[derive(Debug, Clone)]
+pub(crate) struct Selected {
+    pub(crate) model: Model,
+    pub(crate) size: usize,
+    pub(crate) losses: Losses,
+    /// those of the sensor as it is
+    pub(crate) raw: Option<Losses>,
+}
+
+/// The data of a selection, with readouts fitted without each fold kept.
+pub(crate) struct Selection<'a> {
+    sensor: &'a Sensor,
+    runs: Vec<SensorRun>,
+    folds: Folds,
+    rails: Rails,
+    starts: Vec<Readout>,
+    /// samples without each fold, by readout
+    without: BTreeMap<Option<Front>, Option<Vec<Vec<Sample>>>>,
+}
+
+impl<'a> Selection<'a> {
+    pub(crate) fn new(sensor: &'a Sensor, fit_runs: &[SensorRun], rails: Rails, starts: &[Readout]) -> Self {
+        let rows: usize = fit_runs.iter().map(SensorRun::len).sum();
+        let stride = (rows / ENOUGH_ROWS).max(1);
+        let runs: Vec<SensorRun> =
+            fit_runs.iter().map(|r| if stride > 1 { r.thinned(stride) } else { r.clone() }).collect();
+        let folds = Folds::of(&runs, sensor.gain.abs() * sensor.cycles);
+        Self { sensor, runs, folds, rails, starts: starts.to_vec(), without: BTreeMap::new() }
+    }
+
+    /// Chooses a model; `None` where there is not even one to compare.
+    pub(crate) fn select(&mut self) -> Option<Selected> {
+        let constant = Shape::constant(self.sensor.free_gain);
+        let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
+        let raw = self.offer(&[plain], &[constant]).pop();
+        let mut pool = Vec::new();
+        let fronts = if self.channels() { self.readouts(&mut pool)? } else { vec![None] };
+        let motions = self.motions(fronts[0]);
+        pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
+        let mut chosen = choose(&pool)?.clone();
+        for _ in 0..MOST_LINES {
+            let Some(better) = self.with_a_line(&chosen) else { break };
+            chosen = better;
+        }
+        Some(Selected { model: chosen.model, size: chosen.size, losses: chosen.losses, raw: raw.map(|c| c.losses) })
+    }
+
+    fn channels(&self) -> bool {
+        self.runs.iter().all(|r| matches!(r.reading, Reading::Channels(_)))
+    }
+
+    /// Who is to be believed is settled with the affine readout; cubics inherit it. The best few remain.
+    fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Option<Vec<Option<Front>>> {
+        let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
+        let mut fronts = vec![Some((Kind::Plain, Weighting::Equal))];
+        if !self.starts.is_empty() {
+            fronts.extend([Kind::Offset, Kind::Affine].iter().flat_map(|k| Weighting::ALL.map(|w| Some((*k, w)))));
+        }
+        let mut first = self.offer(&fronts, &coarse);
+        let affine: Vec<_> = first.iter().filter(|c| c.model.0.is_some_and(|f| f.0 == Kind::Affine)).cloned().collect();
+        if let Some((_, weighting)) = choose(&affine).and_then(|c| c.model.0) {
+            first.extend(
+                self.offer(&[Some((Kind::Cubic, weighting)), Some((Kind::CubicPerChannel, weighting))], &coarse),
+            );
+        }
+        let mut best: BTreeMap<Option<Front>, f64> = BTreeMap::new();
+        for c in &first {
+            let least = best.entry(c.model.0).or_insert(f64::INFINITY);
+            *least = least.min(c.losses.rms());
+        }
+        let mut ranked: Vec<_> = best.into_iter().collect();
+        ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let finalists: Vec<_> = ranked.into_iter().take(FINALISTS).map(|(f, _)| f).collect();
+        pool.extend(first.into_iter().filter(|c| !finalists.contains(&c.model.0)));
+        (!finalists.is_empty()).then_some(finalists)
+    }
+
+    /// How the angle follows motion is settled once.
+    fn motions(&mut self, front: Option<Front>) -> Vec<Motion> {
+        let rates: Vec<f64> = self.runs.iter().flat_map(|r| r.rate_rad_s.iter().copied()).collect();
+        let fastest = rates.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
+        let deviation = (rates.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / rates.len() as f64).sqrt();
+        if deviation <= VARYING_RATE * fastest {
+            return vec![Motion::None];
+        }
+        let steady = speed_is_one(&rates, fastest);
+        let all = if steady {
+            vec![Motion::None, Motion::Direction]
+        } else {
+            vec![Motion::None, Motion::Direction, Motion::Rate, Motion::RateAndAcceleration]
+        };
+        let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));
+        match choose(&trial).map(|c| c.model.1.motion) {
+            None | Some(Motion::None) => vec![Motion::None],
+            Some(motion) => vec![Motion::None, motion],
+        }
+    }
+
+    fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {
+        let mut out = Vec::new();
+        for &order in orders {
+            for form in [Form::Own, Form::Forward].into_iter().take(if order == 0 { 1 } else { 2 }) {
+                for &motion in motions {
+                    out.push(Shape { form, order, motion, lines: lines.to_vec(), free_gain: self.sensor.free_gain });
+                }
+            }
+        }
+        out
+    }
+
+    /// Cross-validates every readout with every shape that the rows can carry.
+    fn offer(&mut self, fronts: &[Option<Front>], shapes: &[Shape]) -> Vec<Candidate<Model>> {
+        let missing: Vec<_> = fronts.iter().filter(|f| !self.without.contains_key(f)).copied().collect();
+        let fitted: Vec<_> = missing.par_iter().map(|f| (*f, self.fit_without_each_fold(*f))).collect();
+        self.without.extend(fitted);
+        let rows: usize = self.runs.iter().map(SensorRun::len).sum();
+        let pairs: Vec<(Option<Front>, &Shape)> =
+            fronts.iter().flat_map(|f| shapes.iter().map(move |s| (*f, s))).collect();
+        pairs
+            .into_par_iter()
+            .filter_map(|(front, shape)| {
+                let size = front.map_or(0, |f| f.0.free().len()) + shape.size();
+                if (size + self.runs.len()) * ROWS_PER_UNKNOWN > rows {
+                    return None;
+                }
+                let samples = self.without.get(&front)?.as_ref()?;
+                // without a readout to fit all folds have the same samples
+                let without = |fold: usize| samples.get(fold.min(samples.len() - 1)).map(Vec::as_slice);
+                let losses = cross_validate(without, &self.folds, shape, self.runs.len(), self.sensor.cycles)?;
+                Some(Candidate { size, model: (front, shape.clone()), losses })
+            })
+            .collect()
+    }
+
+    fn fit_without_each_fold(&self, front: Option<Front>) -> Option<Vec<Vec<Sample>>> {
+        let Some((kind, weighting)) = front.filter(|f| f.0 != Kind::Plain) else {
+            let readout = front.map(|_| Readout::plain());
+            return Some(vec![self.sensor.samples(&self.runs, readout.as_ref())]);
+        };
+        let whole = self.fit_readout(kind, weighting, &self.runs)?;
+        (0..self.folds.count)
+            .map(|fold| {
+                let kept = self.folds.without(&self.runs, fold);
+                let gain = self.sensor.gain;
+                let fitted = fit(kind, weighting, &kept, gain, &whole.readout)?;
+                Some(self.sensor.samples(&self.runs, Some(&fitted.readout)))
+            })
+            .collect()
+    }
+
+    fn fit_readout(&self, kind: Kind, weighting: Weighting, runs: &[SensorRun]) -> Option<ReadoutFit> {
+        fit_from(&self.starts, self.rails, kind, weighting, runs, self.sensor.gain)
+    }
+
+    /// The best model with one isolated line more, if it is better by more than a standard error.
+    fn with_a_line(&mut self, chosen: &Candidate<Model>) -> Option<Candidate<Model>> {
+        let (front, shape) = &chosen.model;
+        let readout = front.and_then(|(kind, weighting)| self.fit_readout(kind, weighting, &self.runs));
+        let samples = self.sensor.samples(&self.runs, readout.as_ref().map(|f| &f.readout));
+        let table = TableFit::new(shape, &samples, self.runs.len(), self.sensor.cycles)?;
+        let line = strongest_line(&samples, &table, self.sensor.cycles_per_turn())?;
+        let mut orders: Vec<usize> =
+            ORDERS.into_iter().filter(|n| *n <= shape.order.max(ORDER_BESIDE_LINES)).chain([shape.order]).collect();
+        orders.sort_unstable();
+        orders.dedup();
+        let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
+        let more = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
+        let better = choose(&more)?;
+        better.losses.is_better_than(&chosen.losses).then(|| better.clone())
+    }
+}
+
+/// The better of the fits from every start.
+pub(crate) fn fit_from(
+    starts: &[Readout],
+    rails: Rails,
+    kind: Kind,
+    weighting: Weighting,
+    runs: &[SensorRun],
+    gain: f64,
+) -> Option<ReadoutFit> {
+    let fits = starts.iter().filter_map(|s| fit(kind, weighting, runs, gain, &Readout { rails, ..s.clone() }));
+    fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Where the fits of a readout begin.
+pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
+    [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
+}
+
+/// The reference turns at one speed, one way or both: a lag and a dead band are then the same.
+fn speed_is_one(rates: &[f64], fastest: f64) -> bool {
+    let mut speeds: Vec<f64> = rates.iter().map(|r| r.abs()).filter(|r| *r > 0.5 * fastest).collect();
+    speeds.sort_by(f64::total_cmp);
+    let edge = speeds.len() / 20;
+    let inner = &speeds[edge..speeds.len() - edge];
+    inner.len() * 10 > rates.len() * 8 && span(inner) < 0.05 * fastest
+}

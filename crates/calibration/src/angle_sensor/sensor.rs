@@ -1,0 +1,132 @@
+//! What is known of a sensor before any fit: the period of its angle, its angular gain and its sense.
+
+use std::f64::consts::TAU;
+
+use super::readout::Readout;
+use super::samples::{Reading, SensorRun};
+use super::table_fit::Sample;
+use crate::data::track::wrapped;
+use crate::estimation::linear::NormalEquations;
+use crate::estimation::statistics::{circular_mean, median};
+
+/// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one.
+const WHOLE: f64 = 0.02;
+/// Samples whose circular mean begins the unwrapping of an error.
+const BEGINNING: usize = 50;
+
+/// A sensor as it is taken before its errors are known: θ = gain · reference + constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sensor {
+    /// signed angular gain
+    pub(crate) gain: f64,
+    /// nothing says that the gain is exact: it is adjusted
+    pub(crate) free_gain: bool,
+    /// period of the angle, rad
+    pub(crate) period: f64,
+    /// 2π over the period
+    pub(crate) cycles: f64,
+}
+
+impl Sensor {
+    /// The sensor of a campaign: its gain as stated, or as the data has it; the sense always as the data has it.
+    pub(crate) fn new(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Self {
+        let size = stated_gain.unwrap_or_else(|| magnitude(runs, period)).abs();
+        let whole = (size - size.round()).abs() < if stated_gain.is_some() { 1e-9 } else { WHOLE } && size > 0.5;
+        let size = if whole { size.round() } else { size };
+        let sensor = Self { gain: size, free_gain: !whole, period, cycles: TAU / period };
+        if sensor.misfit(runs, -size) < sensor.misfit(runs, size) { Self { gain: -size, ..sensor } } else { sensor }
+    }
+
+    /// Harmonics of the angle per turn of the reference.
+    pub(crate) fn cycles_per_turn(&self) -> f64 {
+        self.cycles * self.gain.abs()
+    }
+
+    /// How badly a signed gain fits, for telling the sense.
+    fn misfit(&self, runs: &[SensorRun], gain: f64) -> f64 {
+        runs.iter()
+            .map(|r| match &r.reading {
+                Reading::Angle(theta) => {
+                    let (c, s) = theta.iter().zip(&r.reference_rad).fold((0.0, 0.0), |(c, s), (t, a)| {
+                        let (sin, cos) = (self.cycles * (t - gain * a)).sin_cos();
+                        (c + cos, s + sin)
+                    });
+                    r.len() as f64 - c.hypot(s)
+                }
+                Reading::Channels(v) => turning_left(v, &r.reference_rad, gain),
+            })
+            .sum()
+    }
+
+    /// Samples of all runs, one after the other, with the readout undone.
+    pub(crate) fn samples(&self, runs: &[SensorRun], readout: Option<&Readout>) -> Vec<Sample> {
+        let plain = Readout::plain();
+        let readout = readout.unwrap_or(&plain);
+        let mut out = Vec::with_capacity(runs.iter().map(SensorRun::len).sum());
+        for (run, r) in runs.iter().enumerate() {
+            let theta: Vec<f64> = match &r.reading {
+                Reading::Angle(theta) => theta.clone(),
+                Reading::Channels(v) => v.iter().map(|z| readout.angle(*z)).collect(),
+            };
+            let raw: Vec<f64> = theta.iter().zip(&r.reference_rad).map(|(t, a)| t - self.gain * a).collect();
+            let error = centred(&raw, self.period);
+            out.extend((0..r.len()).map(|i| Sample {
+                theta: theta[i],
+                error: error[i],
+                reference: r.reference_rad[i],
+                rate: r.rate_rad_s[i],
+                acceleration: r.acceleration_rad_s2[i],
+                run,
+            }));
+        }
+        out
+    }
+}
+
+/// An error followed through its period from the circular mean of its first samples on, about its median.
+pub(crate) fn centred(raw: &[f64], period: f64) -> Vec<f64> {
+    let begin = circular_mean(raw.iter().take(BEGINNING).copied(), period);
+    let mut last = 0.0;
+    let mut out: Vec<f64> = raw
+        .iter()
+        .map(|e| {
+            last += wrapped(e - begin - last, period);
+            last
+        })
+        .collect();
+    let middle = median(&mut out.clone());
+    out.iter_mut().for_each(|e| *e -= middle);
+    out
+}
+
+/// What a circle that turns with the reference leaves of both channels.
+fn turning_left(channels: &[[f64; 2]], reference: &[f64], gain: f64) -> f64 {
+    // x + iy = o + A e^{i g a}: two complex unknowns, as four real ones
+    let mut equations = NormalEquations::new(4);
+    let rows = |z: &[f64; 2], a: &f64| {
+        let (sin, cos) = (gain * a).sin_cos();
+        [([1.0, 0.0, cos, -sin], z[0]), ([0.0, 1.0, sin, cos], z[1])]
+    };
+    for (z, a) in channels.iter().zip(reference) {
+        for (row, value) in rows(z, a) {
+            equations.add(&row, value);
+        }
+    }
+    let x = equations.solve();
+    let left = |(row, value): ([f64; 4], f64)| (value - row.iter().zip(&x).map(|(a, b)| a * b).sum::<f64>()).powi(2);
+    channels.iter().zip(reference).flat_map(|(z, a)| rows(z, a)).map(left).sum()
+}
+
+/// |gain| where none is stated: the slope of the followed angle over the reference, in the run that turns the furthest.
+fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
+    let Some(longest) = runs.iter().max_by(|a, b| a.travel_rad().total_cmp(&b.travel_rad())) else { return 1.0 };
+    let theta: Vec<f64> = match &longest.reading {
+        Reading::Angle(theta) => theta.clone(),
+        Reading::Channels(v) => {
+            let start = super::ellipse::algebraic(std::slice::from_ref(longest)).unwrap_or_else(Readout::plain);
+            v.iter().map(|z| start.angle(*z)).collect()
+        }
+    };
+    let followed = super::samples::unwrapped(theta.into_iter(), period);
+    crate::estimation::statistics::line(&longest.reference_rad, &followed).0.abs()
+}
