@@ -383,6 +383,24 @@ fn compensating_a_recording_leaves_what_the_report_says() {
     assert!((rms / held_out(&i) - 1.0).abs() < 0.1, "{rms} {}", held_out(&i));
 }
 
+#[test]
+fn rows_more_than_half_a_period_apart_do_not_tell_an_angular_gain() {
+    let angles: Vec<f64> = (0..500).map(|i| f64::from(i) * 250.0).collect();
+    let (x, y) = channels(&angles, 1.0, 0.0, 1e-4, 11);
+    let recording = Recording {
+        t_s: (0..500).map(|i| f64::from(i) * 0.5).collect(),
+        rate_dps: Some(vec![500.0; 500]),
+        xc_v: Some(x),
+        yc_v: Some(y),
+        ..Recording::default()
+    };
+    let stated = sensor(vec![run("logger.csv", Role::Fit, recording)]);
+    let refusal = identify(Campaign { angular_gain: None, ..stated.clone() }, &Options::default()).unwrap_err();
+    assert!(refusal.problem.contains("250°") && refusal.wanted.contains("pole_pairs"), "{refusal}");
+    let ratio = identified(stated).report.detection_gain_ratio.unwrap();
+    assert!((ratio.value - 1.06).abs() < 1e-3, "{ratio:?}");
+}
+
 /// Real devices beside what a short script gets: `CVG_DEVICES` names the folder. Printed, and never worse by more than
 /// 2 mdeg.
 #[test]

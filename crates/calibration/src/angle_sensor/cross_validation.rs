@@ -201,3 +201,37 @@ pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>]) -> Option<&Candidate<M
         .filter(|c| c.losses.is_as_good_as(&best.losses))
         .min_by(|a, b| a.size.cmp(&b.size).then_with(|| by_loss(a, b)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(size: usize, model: &'static str, sum: [f64; 4]) -> Candidate<&'static str> {
+        Candidate { size, model, losses: Losses { sum: sum.to_vec(), rows: 4 } }
+    }
+
+    #[test]
+    fn the_order_in_which_candidates_are_tried_has_no_say() {
+        let mut candidates = vec![
+            candidate(0, "nothing", [9.0, 8.0, 9.5, 8.5]),
+            candidate(2, "offset", [1.1, 1.0, 1.2, 0.9]),
+            candidate(2, "lag", [1.1, 1.0, 1.2, 0.9]),
+            candidate(4, "affine", [1.0, 1.1, 1.0, 1.0]),
+            candidate(12, "table", [0.9, 1.0, 1.1, 1.0]),
+        ];
+        for turn in 0..candidates.len() {
+            candidates.rotate_left(1);
+            if turn % 2 == 0 {
+                candidates.reverse();
+            }
+            // as good as the best within a standard error, the simplest, and of two alike the first by name
+            assert_eq!(choose(&candidates).map(|c| c.model), Some("lag"));
+        }
+    }
+
+    #[test]
+    fn a_model_is_not_simplified_beyond_one_standard_error() {
+        let better = [candidate(0, "nothing", [1.2, 1.3, 1.25, 1.22]), candidate(2, "offset", [1.0, 1.1, 1.04, 1.03])];
+        assert_eq!(choose(&better).map(|c| c.model), Some("offset"));
+    }
+}

@@ -47,13 +47,13 @@ impl SensorModel {
     /// # Errors
     /// Where nothing is left that can be inverted.
     pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Self, Refusal> {
-        let sensor = Sensor::new(stated_gain, period, runs);
+        let sensor = Sensor::new(stated_gain, period, runs)?;
         if runs.iter().all(|r| r.commanded && r.channels().is_some()) {
             return Self::by_radius(sensor, runs);
         }
         let believed: Vec<SensorRun> = runs.iter().filter(|r| !r.commanded).cloned().collect();
         let runs = if believed.is_empty() { runs } else { &believed };
-        let sensor = Sensor::new(stated_gain, period, runs);
+        let sensor = Sensor::new(stated_gain, period, runs)?;
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
         let selected = Selection::new(&sensor, runs, rails, &starts).select();

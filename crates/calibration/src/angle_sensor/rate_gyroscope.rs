@@ -215,7 +215,7 @@ fn splits(all: &[Stretch]) -> Vec<Split> {
 impl RateGyroscope {
     /// Identifies bias, scale factor and lag; `None` where no run has an angle or rows enough.
     pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Option<Self> {
-        let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs);
+        let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs).ok()?;
         let all: Vec<Stretch> = runs.iter().enumerate().filter_map(|(i, r)| Stretch::new(r, i, &sensor)).collect();
         let splits = splits(&all);
         if splits.len() < 2 {

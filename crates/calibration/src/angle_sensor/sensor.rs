@@ -6,6 +6,7 @@ use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
 use crate::data::track::wrapped;
+use crate::error::Refusal;
 use crate::estimation::linear::NormalEquations;
 use crate::estimation::statistics::{circular_mean, median};
 
@@ -29,12 +30,33 @@ pub(crate) struct Sensor {
 
 impl Sensor {
     /// The sensor of a campaign: its gain as stated, or as the data has it; the sense always as the data has it.
-    pub(crate) fn new(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Self {
+    ///
+    /// # Errors
+    /// Where no gain is stated and the rows stand half a period or more apart: any gain that differs by a period between two
+    /// rows would do as well.
+    pub(crate) fn new(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Self, Refusal> {
+        let step = coarsest_step(runs);
+        if stated_gain.is_none() && step >= 0.5 * period {
+            return Err(Refusal::no_answer(
+                "campaign",
+                format!(
+                    "the reference turns by {:.0}° from row to row and the angle repeats every {:.0}°, so that many angular \
+                     gains fit alike",
+                    step.to_degrees(),
+                    period.to_degrees()
+                ),
+                format!(
+                    "angular_gain or pole_pairs in campaign.toml, or rows less than {:.0}° apart",
+                    0.5 * period.to_degrees()
+                ),
+            ));
+        }
         let size = stated_gain.unwrap_or_else(|| magnitude(runs, period)).abs();
         let whole = (size - size.round()).abs() < if stated_gain.is_some() { 1e-9 } else { WHOLE } && size > 0.5;
         let size = if whole { size.round() } else { size };
         let sensor = Self { gain: size, free_gain: !whole, period, cycles: TAU / period };
-        if sensor.misfit(runs, -size) < sensor.misfit(runs, size) { Self { gain: -size, ..sensor } } else { sensor }
+        let opposite = sensor.misfit(runs, -size) < sensor.misfit(runs, size);
+        Ok(if opposite { Self { gain: -size, ..sensor } } else { sensor })
     }
 
     /// Harmonics of the angle per turn of the reference.
@@ -97,6 +119,13 @@ pub(crate) fn centred(raw: &[f64], period: f64) -> Vec<f64> {
     let middle = median(&mut out.clone());
     out.iter_mut().for_each(|e| *e -= middle);
     out
+}
+
+/// The median step of the reference from row to row in the run where it is the largest, rad.
+fn coarsest_step(runs: &[SensorRun]) -> f64 {
+    let median_step =
+        |r: &SensorRun| median(&mut r.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>());
+    runs.iter().map(median_step).fold(0.0, f64::max)
 }
 
 /// What a circle that turns with the reference leaves of both channels.
