@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::{Campaign, Recording, Role, Run, RunKind};
-use cvg_calibration::{Identification, Options, identify};
+use cvg_calibration::{Cause, Identification, Options, Refusal, identify};
 use cvg_simulator::noise::Noise;
 use cvg_tests::bench::{holds, over_floor};
 
@@ -64,6 +64,10 @@ fn stepped(theta: f64, h: f64) -> f64 {
 }
 
 fn identified(recording: Recording) -> Identification {
+    asked(recording).unwrap()
+}
+
+fn asked(recording: Recording) -> Result<Identification, Refusal> {
     let run = Run {
         kind: RunKind::Rotation,
         file: "long.csv".into(),
@@ -73,7 +77,7 @@ fn identified(recording: Recording) -> Identification {
         recording,
     };
     let campaign = Campaign { device: "long".into(), runs: vec![run], ..Campaign::default() };
-    identify(campaign, &Options::default()).unwrap()
+    identify(campaign, &Options::default())
 }
 
 #[test]
@@ -102,13 +106,13 @@ fn half_an_hour_is_followed_to_its_end() {
 }
 
 #[test]
-fn an_angle_that_is_lost_is_said_to_be() {
+fn an_angle_that_is_lost_is_no_answer() {
     let mut recording = recorded(200.0, 100.0, 0.0);
     let held_out = recording.t_s.len() * 4 / 5;
     for rate in recording.rate_dps.iter_mut().flatten().skip(held_out) {
         *rate = -*rate;
     }
-    let report = identified(recording).report;
-    assert!(report.heldout.discovered.rms_deg > 18.0);
-    assert!(report.warnings.iter().any(|w| w.contains("the angle is not followed")), "{:?}", report.warnings);
+    let refusal = asked(recording).unwrap_err();
+    assert_eq!(refusal.cause, Cause::NoAnswer, "{refusal}");
+    assert!(refusal.problem.contains("does not follow the input"), "{refusal}");
 }

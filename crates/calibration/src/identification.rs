@@ -18,7 +18,9 @@ use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::calibration::Calibration;
 use crate::report::channels::channels;
+use crate::report::gate::{self, Facts};
 use crate::report::provenance;
+use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{described, unexplained};
 use crate::report::{
@@ -87,8 +89,6 @@ const TOLD: f64 = 0.1;
 /// Gain ratios known no better than this, as the half width of the interval, are no answer.
 const WIDEST_DETECTION_RATIO: f64 = 0.1;
 const WIDEST_ACTUATION_RATIO: f64 = 0.02;
-/// A held-out error beyond this share of the angle's period is no error of an angle that is followed.
-const LARGEST_ERROR: f64 = 0.1;
 
 /// Identifies the instrument of a campaign.
 ///
@@ -112,7 +112,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     }
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
-    let inputs = provenance::inputs(&campaign);
+    let inputs = provenance::sums(&provenance::files(&campaign));
     (options.progress)("preparing the runs");
     let mut bench = Bench::new(campaign)?;
     (options.progress)("fitting the declared model");
@@ -147,13 +147,6 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
     let actuation_gain_ratio = knowledge.actuation_ratio(&mut warnings);
     let effects = knowledge.effects(&steps, &after);
-    if after.mean_square().sqrt() > LARGEST_ERROR * bench.start.period_rad {
-        warnings.push(format!(
-            "the angle is not followed: the model is off by {:.0}° on held-out data, so that nothing here can be relied \
-             on; rate_dps or table_deg, and the signs and scales of the channels, may not be what the campaign says",
-            after.mean_square().sqrt().to_degrees()
-        ));
-    }
     for e in effects.iter().filter(|e| !e.confounded_with.is_empty()) {
         warnings.push(format!(
             "{} is confounded with {} in this campaign; {} would separate them",
@@ -181,7 +174,8 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     if spikes > 0 {
         warnings.push(format!("{spikes} samples were set aside as spikes"));
     }
-    for (run, t) in runs.iter_mut().filter(|r| r.kind == "rotation").zip(&bench.tracks) {
+    warnings.extend(tell_apart(&mut runs, &bench, &fitted.fit, (&on_fit, &after)));
+    for (run, t) in bench.screen.of(&mut runs).into_iter().zip(&bench.tracks) {
         run.rate_dps = Some(t.track.mean_rate().to_degrees());
         run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
             (true, true) => "fit, last quarter held out".into(),
@@ -194,7 +188,14 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     }
     let mut unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
     unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
-    let report = Report {
+    let facts = Facts {
+        instrument: bench.instrument,
+        period_deg: bench.start.period_rad.to_degrees(),
+        stated: bench.screen.stated(),
+        held_out: after.errors().count(),
+        fitted_rms_deg: on_fit.mean_square().sqrt().to_degrees(),
+    };
+    let mut report = Report {
         schema: SCHEMA.into(),
         status: Status::Answered,
         reason: None,
@@ -230,12 +231,33 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         proposals: Vec::new(),
         warnings,
     };
+    let mut calibration = Calibration { device, hypothesis: fitted.fit.hypothesis };
+    gate::pass(&report, &calibration, facts)?;
+    if let Some(reason) = no_better(&report.heldout, after.errors().count()) {
+        (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
+        report.warnings.insert(0, reason);
+        calibration.hypothesis = ideal;
+    }
     Ok(Identification {
         report,
         figures: figures(&bench, raw.as_ref(), &before, &after, fitted.ring_downs),
-        calibration: Calibration { device, hypothesis: fitted.fit.hypothesis },
+        calibration,
         steps,
         picture,
+    })
+}
+
+/// Why what was found is of no use, where it is not: on `samples` held-out samples the error is larger with it than without,
+/// by more than the standard error of a root mean square.
+fn no_better(heldout: &Heldout, samples: usize) -> Option<String> {
+    let raw = heldout.raw?.rms_deg;
+    let rms = heldout.discovered.rms_deg;
+    let by_chance = 1.0 / (2.0 * samples.max(1) as f64).sqrt();
+    (rms > raw * (1.0 + by_chance)).then(|| {
+        format!(
+            "nothing that was found helps on held-out data: {rms:.3e}° rms with it, {raw:.3e}° without; the calibration \
+             leaves the angle as it is"
+        )
     })
 }
 

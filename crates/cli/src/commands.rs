@@ -5,7 +5,8 @@ use std::path::Path;
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::{Campaign, Naming};
-use cvg_calibration::{Identification, Options};
+use cvg_calibration::report::refused::{About, Refused};
+use cvg_calibration::{Cause, Identification, Options, Refusal};
 use cvg_simulator::{Scenario, ScenarioError};
 
 use crate::arguments::Arguments;
@@ -44,7 +45,21 @@ pub(crate) fn identify(
     json: bool,
 ) -> Result<(), Failure> {
     out.map_or(Ok(()), output::check_folder)?;
-    let identified = run(open)?;
+    let progress = Progress::begin();
+    progress.say("reading");
+    let opened = open()?;
+    let about = About::campaign(&opened);
+    let identified = match identified(opened, &progress) {
+        Ok(identified) => identified,
+        Err(refusal) => {
+            drop(progress);
+            if refusal.cause == Cause::NoAnswer {
+                refuse(&about.refused(&refusal), out, json)?;
+            }
+            return Err(refusal.into());
+        }
+    };
+    drop(progress);
     if let Some(out) = out {
         write_results(&identified, out)?;
         output::tell(format_args!("wrote {}", out.join("report.html").display()));
@@ -54,16 +69,33 @@ pub(crate) fn identify(
     } else {
         output::answer(&summary(&identified))?;
     }
-    Ok(())
+    identified.report.reason.map_or(Ok(()), |reason| Err(Failure::no_answer(reason)))
+}
+
+/// Says in report.json that there is no answer. What an earlier identification left beside it is not of this campaign, and
+/// goes.
+fn refuse(refused: &Refused, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(refused).map_err(Failure::input)?;
+    if let Some(out) = out {
+        output::write(&out.join("report.json"), text.as_bytes())?;
+        for stale in ["report.html", "calibration.toml"] {
+            output::remove(&out.join(stale))?;
+        }
+        output::tell(format_args!("wrote {}", out.join("report.json").display()));
+    }
+    if json { output::answer(&format!("{text}\n")) } else { Ok(()) }
 }
 
 /// Identifies a campaign, and says what is being done where a person is waiting.
 pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Identification, Failure> {
     let progress = Progress::begin();
     progress.say("reading");
-    let opened = open()?;
+    Ok(identified(open()?, &progress)?)
+}
+
+fn identified(campaign: Campaign, progress: &Progress) -> Result<Identification, Refusal> {
     let options = Options { discover: true, progress: &|what| progress.say(what) };
-    Ok(cvg_calibration::identify_with_picture(opened, &options)?)
+    cvg_calibration::identify_with_picture(campaign, &options)
 }
 
 /// Writes report.json, report.html and calibration.toml: all of them, or none.

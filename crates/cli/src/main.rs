@@ -107,6 +107,11 @@ impl Failure {
     fn input(message: impl std::fmt::Display) -> Self {
         Self { message: message.to_string(), status: 2 }
     }
+
+    /// Sound input without an answer in it.
+    fn no_answer(message: impl std::fmt::Display) -> Self {
+        Self { message: message.to_string(), status: 1 }
+    }
 }
 
 impl From<cvg_calibration::Refusal> for Failure {

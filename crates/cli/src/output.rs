@@ -37,6 +37,16 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_all(&[(path.to_owned(), bytes)])
 }
 
+/// Removes a file, if it is there.
+pub(crate) fn remove(path: &Path) -> Result<(), Failure> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => {
+            Err(Failure::input(format!("{}: cannot be removed: {e}", path.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes all files, or leaves what was there: none is put into its place before every one is complete.
 pub(crate) fn write_all(files: &[(PathBuf, &[u8])]) -> Result<(), Failure> {
     if let Some((path, _)) = files.iter().find(|(path, _)| path.is_dir()) {

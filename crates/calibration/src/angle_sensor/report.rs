@@ -59,7 +59,7 @@ impl Head {
         Self {
             device: campaign.device.clone(),
             runs: campaign.runs.iter().map(run_report).collect(),
-            inputs: provenance::inputs(campaign),
+            inputs: provenance::sums(&provenance::files(campaign)),
             warnings: campaign.runs.iter().flat_map(|r| r.recording.warnings.iter().cloned()).collect(),
         }
     }

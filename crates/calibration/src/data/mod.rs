@@ -1,3 +1,9 @@
-//! What a run is made ready to: angles unwrapped, commands beside them, segments between the jumps.
+//! What a run is made ready to: angles unwrapped, commands beside them, segments between the jumps; and whether a
+//! recording is what it seems: rows that were not recorded anew, references that contradict each other, samples that are
+//! too far apart, runs that do not belong together.
 
+pub(crate) mod agreement;
+pub(crate) mod plausibility;
+pub(crate) mod sampling;
+pub(crate) mod slips;
 pub(crate) mod track;

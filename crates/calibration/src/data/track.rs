@@ -184,6 +184,17 @@ impl Track {
         (self.input_rad[b] - self.input_rad[a]) / (self.t_s[b] - self.t_s[a])
     }
 
+    /// Ends segments before these samples and begins others there; what is too short to carry a bias goes.
+    pub(crate) fn cut(&mut self, at: &[usize]) {
+        for &row in at {
+            let Some(i) = self.segments.iter().position(|s| s.range.start < row && row < s.range.end) else { continue };
+            let rest = Segment { range: row..self.segments[i].range.end, role: self.segments[i].role };
+            self.segments[i].range.end = row;
+            self.segments.insert(i + 1, rest);
+        }
+        self.segments.retain(|s| s.range.len() >= SHORTEST_SEGMENT);
+    }
+
     /// Samples of all segments of a role.
     pub(crate) fn samples(&self, role: Role) -> usize {
         self.segments.iter().filter(|s| s.role == role).map(|s| s.range.len()).sum()
@@ -217,11 +228,13 @@ fn spread(values: &[f64]) -> f64 {
 
 /// The input angle in rad: the table's own, unwrapped, or the rate integrated.
 fn input_angle(recording: &mut Recording) -> Vec<f64> {
-    if let Some(table) = recording.table_deg.take() {
-        return unwrapped(&table, std::f64::consts::TAU);
-    }
-    let rate = recording.rate_dps.take().unwrap_or_default();
+    let table = recording.table_deg.take();
+    let rate = recording.rate_dps.take();
     let t = &recording.t_s;
+    if let Some(table) = table {
+        return along_rate(&table, rate.as_deref(), t);
+    }
+    let rate = rate.unwrap_or_default();
     let mut angle = 0.0;
     let mut out = Vec::with_capacity(t.len());
     for i in 0..rate.len().min(t.len()) {
@@ -229,6 +242,23 @@ fn input_angle(recording: &mut Recording) -> Vec<f64> {
             angle += 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]);
         }
         out.push(angle);
+    }
+    out
+}
+
+/// The table's angle in degrees as a continuous one in rad: each step is the nearest to what the rate says, or the shortest
+/// where there is none.
+fn along_rate(table: &[f64], rate: Option<&[f64]>, t: &[f64]) -> Vec<f64> {
+    let mut out: Vec<f64> = Vec::with_capacity(table.len());
+    for (i, d) in table.iter().enumerate() {
+        let raw = d.to_radians();
+        let last = out.last().copied().unwrap_or(raw);
+        let by_rate = match rate {
+            Some(rate) if i > 0 => 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]),
+            _ => 0.0,
+        };
+        let step = by_rate + wrapped(raw - last - by_rate, std::f64::consts::TAU);
+        out.push(last + step);
     }
     out
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::data::track::{Segment, Track};
 use crate::estimation::propagation::{Pace, Start, walk};
 use crate::estimation::statistics::circular_mean;
-use crate::estimation::sums::Sums;
+use crate::estimation::sums::{Own, Sums};
 use crate::model::hypothesis::{Hypothesis, Unknown, direction};
 use crate::model::unknowns::Unknowns;
 use crate::recording::Role;
@@ -315,15 +315,18 @@ fn collect(
         .iter()
         .zip(starts)
         .map(|(segment, start)| {
-            let drift = if prepared.drifts { DRIFT_RAD_S } else { 0.0 };
-            let mut sums = Sums::new(unknowns.all.len(), *start, drift);
+            let own = own(prepared, segment, hypothesis, unknowns);
+            let mut sums = Sums::new(unknowns.all.len(), *start, own);
+            let mut slopes = vec![0.0; unknowns.all.len()];
             let first = track.t_s[segment.range.start];
             if segment.role == role {
                 let pace = Pace { stride, spike: limit.angle };
                 walk(track, segment, hypothesis, unknowns, *start, pace, |row| {
                     if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
                         let time = track.t_s[row.index] - first;
-                        Sums::add(&mut sums.angle, weights[0], time, row.angle_slopes, row.angle);
+                        slopes.copy_from_slice(row.angle_slopes);
+                        own.reduce(time, &mut slopes);
+                        Sums::add(&mut sums.angle, weights[0], time, &slopes, row.angle);
                         sums.counted[0] += worth;
                         if weights[1] > 0.0 {
                             Sums::add(&mut sums.amplitude, weights[1], time, row.amplitude_slopes, row.amplitude);
@@ -337,6 +340,15 @@ fn collect(
             sums
         })
         .collect()
+}
+
+/// What belongs to a segment alone.
+fn own(prepared: &Prepared, segment: &Segment, hypothesis: &Hypothesis, unknowns: &Unknowns) -> Own {
+    let (track, last) = (&prepared.track, segment.range.end - 1);
+    let turned = track.input_rad[last] - track.input_rad[segment.range.start];
+    let lasted = (track.t_s[last] - track.t_s[segment.range.start]).max(f64::MIN_POSITIVE);
+    let along = unknowns.angular_gain.map(|k| (k, hypothesis.sense() * turned / lasted));
+    Own::new(if prepared.drifts { DRIFT_RAD_S } else { 0.0 }, along)
 }
 
 /// A step of the unknowns and its covariance: all of it, and the part that the residuals' noise makes.
@@ -511,13 +523,16 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
             let mut meat = DMatrix::zeros(n, n);
             let mut blocks = 0;
             for (segment, start) in prepared.track.segments.iter().zip(starts).filter(|(s, _)| s.role == role) {
-                let mut angle = Scores::new(n);
-                let mut amplitude = Scores::new(n);
+                let own = own(prepared, segment, &fit.hypothesis, &sorted);
+                let mut angle = Scores::new(n, own);
+                let mut amplitude = Scores::new(n, Own::new(0.0, None));
+                let first = prepared.track.t_s[segment.range.start];
                 let pace = Pace { stride: prepared.track.stride, spike: prepared.limit.angle };
                 walk(&prepared.track, segment, &fit.hypothesis, &sorted, *start, pace, |row| {
                     if row.angle.abs() <= prepared.limit.angle {
-                        angle.add(prepared.noise.angle.powi(-2), row.angle, row.angle_slopes);
-                        amplitude.add(prepared.noise.amplitude.powi(-2), row.amplitude, row.amplitude_slopes);
+                        let time = prepared.track.t_s[row.index] - first;
+                        angle.add(prepared.noise.angle.powi(-2), time, row.angle, row.angle_slopes);
+                        amplitude.add(prepared.noise.amplitude.powi(-2), time, row.amplitude, row.amplitude_slopes);
                     }
                 });
                 blocks += angle.blocks.len();
@@ -537,36 +552,56 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
 
 /// Scores w·r·slopes of one segment, block by block.
 struct Scores {
-    blocks: Vec<(f64, DVector<f64>)>,
+    own: Own,
+    /// Σ w r, Σ w t r, and Σ w r s per unknown
+    blocks: Vec<([f64; 2], DVector<f64>)>,
     in_block: usize,
-    weight: f64,
-    slopes: DVector<f64>,
+    /// Σ w, Σ w t, Σ w t²
+    weight: [f64; 3],
+    /// Σ w s and Σ w t s per unknown
+    slopes: [DVector<f64>; 2],
+    reduced: Vec<f64>,
 }
 
 impl Scores {
-    fn new(n: usize) -> Self {
-        Self { blocks: Vec::new(), in_block: BLOCK, weight: 0.0, slopes: DVector::zeros(n) }
+    fn new(n: usize, own: Own) -> Self {
+        let slopes = [DVector::zeros(n), DVector::zeros(n)];
+        Self { own, blocks: Vec::new(), in_block: BLOCK, weight: [0.0; 3], slopes, reduced: vec![0.0; n] }
     }
 
-    fn add(&mut self, weight: f64, residual: f64, slopes: &[f64]) {
+    fn add(&mut self, weight: f64, time: f64, residual: f64, slopes: &[f64]) {
         if self.in_block == BLOCK {
-            self.blocks.push((0.0, DVector::zeros(slopes.len())));
+            self.blocks.push(([0.0; 2], DVector::zeros(slopes.len())));
             self.in_block = 0;
         }
         self.in_block += 1;
+        self.reduced.copy_from_slice(slopes);
+        self.own.reduce(time, &mut self.reduced);
         if let Some((rest, score)) = self.blocks.last_mut() {
-            *rest += weight * residual;
-            for (i, s) in slopes.iter().enumerate() {
+            rest[0] += weight * residual;
+            rest[1] += weight * time * residual;
+            for (i, s) in self.reduced.iter().enumerate() {
                 score[i] += weight * residual * s;
-                self.slopes[i] += weight * s;
+                self.slopes[0][i] += weight * s;
+                self.slopes[1][i] += weight * time * s;
             }
         }
-        self.weight += weight;
+        for (sum, power) in self.weight.iter_mut().zip([1.0, time, time * time]) {
+            *sum += weight * power;
+        }
     }
 
-    /// The scores with the segment's bias eliminated: slopes less their mean.
+    /// The scores with the segment's bias and drift eliminated, as the fit eliminates them.
     fn centred(&self) -> Vec<DVector<f64>> {
-        let mean = &self.slopes / self.weight.max(f64::MIN_POSITIVE);
-        self.blocks.iter().map(|(rest, score)| score - &mean * *rest).collect()
+        let Some(inverse) = self.own.inverse(self.weight) else {
+            return self.blocks.iter().map(|(_, score)| score.clone()).collect();
+        };
+        let n = self.reduced.len();
+        let of = |i: usize| inverse * self.own.products(i, self.slopes[0][i], self.slopes[1][i]);
+        let own: Vec<_> = (0..n).map(of).collect();
+        let centre = |([rest, timed], score): &([f64; 2], DVector<f64>)| {
+            DVector::from_fn(n, |i, _| score[i] - own[i][0] * rest - own[i][1] * timed)
+        };
+        self.blocks.iter().map(centre).collect()
     }
 }

@@ -5,6 +5,7 @@
 use cvg_model::effects::{EffectId, Moment};
 use nalgebra::{Matrix5, Vector5};
 
+use crate::data::agreement::Gain;
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
 use crate::estimation::propagation::Start;
@@ -116,34 +117,57 @@ pub(crate) struct Motion {
     pub(crate) deviation: f64,
     /// pattern angle covered, rad
     pub(crate) travel: f64,
+    /// what the halves of the segments tell of the angular gain, where they are long enough to tell
+    pub(crate) halves: Vec<Gain>,
 }
 
-/// Finds the motion of a track: tries the given angular gain, ± 1 for a sensor, and what neighbouring samples say, and
-/// keeps what leaves least.
-pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, given: Option<f64>) -> Result<Motion, Refusal> {
-    let bearings: Vec<Vec<f64>> = track
+/// What is known of an angular gain before the motion is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Guess {
+    /// nothing, or what the campaign states: what leaves least is kept
+    Open(Option<f64>),
+    /// it is this one, whatever its aliases leave
+    Settled(f64),
+}
+
+/// Bearings of a track under a hypothesis, rad, per segment, every `stride` samples.
+pub(crate) fn bearings(track: &Track, hypothesis: &Hypothesis, stride: usize) -> Vec<Vec<f64>> {
+    track
         .segments
         .iter()
         .map(|s| {
             s.range
                 .clone()
-                .step_by(track.stride)
+                .step_by(stride)
                 .map(|i| {
                     let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: 0.0 };
                     hypothesis.bearing(&hypothesis.unread(track.envelope(i), &at))
                 })
                 .collect()
         })
-        .collect();
-    let mut guesses: Vec<f64> = given.into_iter().collect();
-    guesses.extend(neighbours(track, hypothesis, &bearings));
-    if hypothesis.instrument == Instrument::Sensor {
-        guesses.extend([1.0, -1.0]);
-    }
+        .collect()
+}
+
+/// Finds the motion of a track: tries the given angular gain, ± 1 for a sensor, and what neighbouring samples say, and
+/// keeps what leaves least.
+pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, guess: Guess) -> Result<Motion, Refusal> {
+    let bearings = bearings(track, hypothesis, track.stride);
+    let guesses: Vec<f64> = match guess {
+        Guess::Settled(k) => vec![k],
+        Guess::Open(given) => {
+            let mut guesses: Vec<f64> = given.into_iter().collect();
+            guesses.extend(neighbours(track, hypothesis, &bearings));
+            if hypothesis.instrument == Instrument::Sensor {
+                guesses.extend([1.0, -1.0]);
+            }
+            guesses
+        }
+    };
     let motion = guesses
         .into_iter()
         .filter(|g| g.is_finite() && *g != 0.0)
         .map(|g| follow(track, hypothesis, &bearings, g))
+        .filter(|m| m.angular_gain.is_finite() && m.deviation.is_finite())
         .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
         .ok_or_else(|| {
             Refusal::new(
@@ -190,6 +214,7 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
     const MEMORY: usize = 5;
     let sense = hypothesis.sense();
     let mut gains = Vec::new();
+    let mut halves = Vec::new();
     let mut followed: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
     for (segment, bearing) in track.segments.iter().zip(bearings) {
         let zero = track.input_rad[segment.range.start];
@@ -208,15 +233,8 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
             recent[n % MEMORY] = value;
             rest.push(value);
         }
-        // a line through the rest, once more without its outliers
-        let (mut slope, mut intercept) = line(&turned, &rest);
-        for _ in 0..3 {
-            let off = |(a, r): (&f64, &f64)| r - slope * a - intercept;
-            let limit = 4.0 * robust_deviation(turned.iter().zip(&rest).map(off)) + 1e-9;
-            let (x, y): (Vec<f64>, Vec<f64>) =
-                turned.iter().zip(&rest).filter(|p| off(*p).abs() < limit).map(|(a, r)| (*a, *r)).unzip();
-            (slope, intercept) = line(&x, &y);
-        }
+        let (slope, _) = robust_line(&turned, &rest);
+        halves.extend(gains_of_halves(&turned, &rest, guess, (hypothesis, track.mean_speed())));
         let weight: f64 = turned.iter().map(|a| a * a).sum();
         gains.push((guess + sense * slope, weight));
         followed.push((turned, rest));
@@ -241,5 +259,36 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
         .flat_map(|s| s.range.clone())
         .map(|i| gain * track.input_rad[i])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    Motion { angular_gain: gain, starts, deviation: robust_deviation(off.into_iter()), travel: hi - lo }
+    Motion { angular_gain: gain, starts, deviation: robust_deviation(off.into_iter()), travel: hi - lo, halves }
+}
+
+/// A line, fitted once more without its outliers: slope, and what is left, robustly.
+fn robust_line(x: &[f64], y: &[f64]) -> (f64, f64) {
+    let (mut slope, mut intercept) = line(x, y);
+    let mut left = 0.0;
+    for _ in 0..3 {
+        let off = |(a, r): (&f64, &f64)| r - slope * a - intercept;
+        left = robust_deviation(x.iter().zip(y).map(off));
+        let limit = 4.0 * left + 1e-9;
+        let (x, y): (Vec<f64>, Vec<f64>) =
+            x.iter().zip(y).filter(|p| off(*p).abs() < limit).map(|(a, r)| (*a, *r)).unzip();
+        (slope, intercept) = line(&x, &y);
+    }
+    (slope, left)
+}
+
+/// What either half of a segment tells of the angular gain, where it covers a turn of the pattern.
+fn gains_of_halves(turned: &[f64], rest: &[f64], guess: f64, (hypothesis, speed): (&Hypothesis, f64)) -> Vec<Gain> {
+    let period = hypothesis.period_rad;
+    let middle = turned.len() / 2;
+    [0..middle, middle..turned.len()]
+        .into_iter()
+        .filter_map(|part| {
+            let (x, y) = (&turned[part.clone()], &rest[part]);
+            let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            let (slope, left) = robust_line(x, y);
+            let gain = guess + hypothesis.sense() * slope;
+            (gain.abs() * (high - low) > 2.0 * period).then(|| Gain::new(gain, left, period, high - low, speed))
+        })
+        .collect()
 }

@@ -11,6 +11,7 @@ use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, r
 use crate::estimation::identifiability::Alike;
 use crate::estimation::initial_guess::{Ellipse, motion};
 use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::screening::{Screen, stated};
 use crate::estimation::statistics::{median, robust_deviation, white_noise};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::model::unknowns::Unknowns;
@@ -75,6 +76,8 @@ pub(crate) struct Bench {
     pub(crate) raw_angle_turns: bool,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
     pub(crate) drive_is_free: bool,
+    /// which runs are in, and which were left out and why
+    pub(crate) screen: Screen,
 }
 
 impl Bench {
@@ -93,8 +96,12 @@ impl Bench {
             warnings.extend(r.recording.warnings.iter().cloned());
         }
         let split = rotations.iter().all(|r| r.role == Role::Fit);
-        let tracks: Vec<Track> =
-            rotations.into_iter().map(|r| Track::new(r, period_rad, split)).collect::<Result<_, _>>()?;
+        let mut screen = Screen::new(stated(&campaign.angular_gain)?, rotations.len());
+        let tracks: Vec<Track> = screen
+            .mended(rotations, &mut warnings)?
+            .into_iter()
+            .map(|r| Track::new(r, period_rad, split))
+            .collect::<Result<_, _>>()?;
         if tracks.iter().all(|t| t.samples(Role::Fit) == 0) {
             return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
         }
@@ -116,8 +123,7 @@ impl Bench {
         }
         let mut prepared = Vec::new();
         let mut gains = Vec::new();
-        for track in tracks {
-            let motion = motion(&track, &start, campaign.angular_gain)?;
+        for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
             if motion.travel < std::f64::consts::PI {
                 return Err(Refusal::new(
                     &track.name,
@@ -157,6 +163,7 @@ impl Bench {
             quadrature_balance: None,
             raw_angle_turns,
             drive_is_free: false,
+            screen,
         })
     }
 
@@ -185,7 +192,7 @@ impl Bench {
     /// Follows every run anew under another hypothesis: where its segments start, and how far off it may be.
     pub(crate) fn restart(&mut self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
         for p in &mut self.tracks {
-            let motion = motion(&p.track, hypothesis, Some(hypothesis.angular_gain))?;
+            let motion = motion(&p.track, hypothesis, self.screen.guess(hypothesis.angular_gain))?;
             let off = motion.deviation.max(LEAST_NOISE);
             p.noise.angle = off;
             if p.noise.amplitude.is_finite() {

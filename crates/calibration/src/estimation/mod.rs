@@ -9,5 +9,6 @@ pub(crate) mod initial_guess;
 pub(crate) mod joint_fit;
 pub(crate) mod linear;
 pub(crate) mod propagation;
+pub(crate) mod screening;
 pub(crate) mod statistics;
 pub(crate) mod sums;

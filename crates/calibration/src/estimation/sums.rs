@@ -5,31 +5,72 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::estimation::propagation::Start;
 
-/// Weighted sums of one segment: Σ w v vᵀ with v = (1, time, slopes …, residual), for angle and amplitude apart.
+/// What belongs to a segment alone: its bias, and a drift that is believed to be small.
+///
+/// At a steady rate the slope of the angular gain is the time times that rate, which the drift has as well: what is left of
+/// one beside the other is what is believed of the drift, 1e-13 of either and below what a difference of their sums
+/// resolves. So it is taken out of the slope sample by sample, and goes with the drift in what is believed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Own {
+    /// 1/variance of the drift before the data, s²/rad²; infinite where there is none
+    drift: f64,
+    /// column of the unknown whose slope goes with the time, and the part of it that does, rad/s
+    along: Option<(usize, f64)>,
+}
+
+impl Own {
+    /// A bias, and a drift of this standard deviation, rad/s, beside which `along` says what goes with the time.
+    pub(crate) fn new(drift_deviation: f64, along: Option<(usize, f64)>) -> Self {
+        Self { drift: drift_deviation.powi(-2), along: along.filter(|_| drift_deviation > 0.0) }
+    }
+
+    /// Takes out of the slopes what goes with the time.
+    pub(crate) fn reduce(&self, time: f64, slopes: &mut [f64]) {
+        if let Some((column, per_s)) = self.along {
+            slopes[column] -= per_s * time;
+        }
+    }
+
+    /// What an unknown adds to the drift, rad/s per unit of it.
+    pub(crate) fn per_s(&self, unknown: usize) -> f64 {
+        self.along.filter(|a| a.0 == unknown).map_or(0.0, |a| a.1)
+    }
+
+    /// Inverse of the block of bias and drift, from Σ w, Σ w t and Σ w t².
+    pub(crate) fn inverse(&self, [w, wt, wtt]: [f64; 3]) -> Option<Matrix2<f64>> {
+        if w <= 0.0 {
+            return None;
+        }
+        if self.drift.is_infinite() {
+            return Some(Matrix2::new(1.0 / w, 0.0, 0.0, 0.0));
+        }
+        Matrix2::new(w, wt, wt, wtt + self.drift).try_inverse()
+    }
+
+    /// Products of an unknown's reduced slope with the two columns, Σ w s and Σ w t s, with what is believed.
+    pub(crate) fn products(&self, unknown: usize, ws: f64, wts: f64) -> Vector2<f64> {
+        let believed = if self.drift.is_infinite() { 0.0 } else { self.drift * self.per_s(unknown) };
+        Vector2::new(ws, wts - believed)
+    }
+}
+
+/// Weighted sums of one segment: Σ w v vᵀ with v = (1, time, slopes …, residual), for angle and amplitude apart. Slopes are
+/// reduced as [`Own`] says.
 pub(crate) struct Sums {
     n: usize,
     pub(crate) angle: Vec<f64>,
     pub(crate) amplitude: Vec<f64>,
     pub(crate) counted: [usize; 2],
     pub(crate) set_aside: usize,
-    /// 1/variance of the drift before the data, s²/rad²; infinite where there is none
-    drift: f64,
+    own: Own,
     start: Start,
 }
 
 impl Sums {
     /// Empty sums for `n` unknowns on a segment that starts at `start`.
-    pub(crate) fn new(n: usize, start: Start, drift_deviation: f64) -> Self {
+    pub(crate) fn new(n: usize, start: Start, own: Own) -> Self {
         let size = (n + 3) * (n + 4) / 2;
-        Self {
-            n,
-            angle: vec![0.0; size],
-            amplitude: vec![0.0; size],
-            counted: [0; 2],
-            set_aside: 0,
-            drift: drift_deviation.powi(-2),
-            start,
-        }
+        Self { n, angle: vec![0.0; size], amplitude: vec![0.0; size], counted: [0; 2], set_aside: 0, own, start }
     }
 
     pub(crate) fn add(packed: &mut [f64], weight: f64, time: f64, slopes: &[f64], residual: f64) {
@@ -60,24 +101,22 @@ impl Sums {
         packed[i * (i + 1) / 2 + j]
     }
 
-    /// Products of a row with the segment's own two columns.
-    fn own(packed: &[f64], i: usize) -> Vector2<f64> {
-        Vector2::new(Self::element(packed, i, 0), Self::element(packed, i, 1))
+    /// Products of an unknown's slope with the segment's own two columns.
+    fn own(&self, packed: &[f64], unknown: usize) -> Vector2<f64> {
+        self.own.products(unknown, Self::element(packed, unknown + 2, 0), Self::element(packed, unknown + 2, 1))
     }
 
     /// The inverse of the segment's own block, and the residual's products with its columns less what the prior of the
     /// drift pulls.
     fn own_block(&self, packed: &[f64]) -> Option<(Matrix2<f64>, Vector2<f64>)> {
-        if packed[0] <= 0.0 {
-            return None;
-        }
-        let mut residual = Self::own(packed, self.n + 2);
-        if self.drift.is_infinite() {
-            return Some((Matrix2::new(1.0 / packed[0], 0.0, 0.0, 0.0), residual));
-        }
-        residual[1] -= self.drift * self.start.drift;
-        let block = Matrix2::new(packed[0], packed[1], packed[1], packed[2] + self.drift);
-        block.try_inverse().map(|inverse| (inverse, residual))
+        let inverse = self.own.inverse([packed[0], packed[1], packed[2]])?;
+        let row = self.n + 2;
+        Some((inverse, Vector2::new(Self::element(packed, row, 0), Self::element(packed, row, 1) - self.pull())))
+    }
+
+    /// What is believed of the drift pulls it back by this.
+    fn pull(&self) -> f64 {
+        if self.own.drift.is_infinite() { 0.0 } else { self.own.drift * self.start.drift }
     }
 
     /// Adds this segment's part to the normal matrix, the right side and Σr².
@@ -85,24 +124,28 @@ impl Sums {
         let n = self.n;
         let Some((inverse, residual)) = self.own_block(packed) else { return 0.0 };
         for i in 0..n {
-            let own = inverse * Self::own(packed, i + 2);
+            let own = inverse * self.own(packed, i);
             for j in 0..=i {
-                let v = Self::element(packed, i + 2, j + 2) - own.dot(&Self::own(packed, j + 2));
+                let products = self.own.products(j, 0.0, 0.0)[1] * self.own.per_s(i);
+                let v = Self::element(packed, i + 2, j + 2) - products - own.dot(&self.own(packed, j));
                 normal[(i, j)] += v;
                 if i != j {
                     normal[(j, i)] += v;
                 }
             }
-            right[i] += Self::element(packed, n + 2, i + 2) - own.dot(&residual);
+            right[i] += Self::element(packed, n + 2, i + 2) + self.own.per_s(i) * self.pull() - own.dot(&residual);
         }
-        let believed = if self.drift.is_infinite() { 0.0 } else { self.drift * self.start.drift.powi(2) };
+        let believed = self.pull() * self.start.drift;
         Self::element(packed, n + 2, n + 2) + believed - residual.dot(&(inverse * residual))
     }
 
     /// By how much the segment's bias and drift move with a step of the unknowns.
     pub(crate) fn start_shift(&self, packed: &[f64], step: &DVector<f64>) -> Vector2<f64> {
         let Some((inverse, residual)) = self.own_block(packed) else { return Vector2::zeros() };
-        let explained = (0..self.n).fold(Vector2::zeros(), |sum, i| sum + Self::own(packed, i + 2) * step[i]);
-        inverse * (residual - explained)
+        let explained = (0..self.n).fold(Vector2::zeros(), |sum, i| sum + self.own(packed, i) * step[i]);
+        let mut shift = inverse * (residual - explained);
+        // the unknown whose slope was reduced takes its part of the drift with it
+        shift[1] -= (0..self.n).map(|i| self.own.per_s(i) * step[i]).sum::<f64>();
+        shift
     }
 }

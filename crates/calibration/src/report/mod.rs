@@ -4,7 +4,10 @@ pub mod calibration;
 pub(crate) mod channels;
 pub(crate) mod compensate;
 mod facts;
+pub(crate) mod gate;
 pub(crate) mod provenance;
+pub mod refused;
+pub(crate) mod runs;
 pub(crate) mod stages;
 pub(crate) mod unexplained;
 

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::recording::Campaign;
 use crate::report::Input;
@@ -10,8 +10,15 @@ use crate::report::Input;
 /// Bytes that are read at once.
 const PIECE: usize = 1 << 16;
 
+/// A file and what the campaign calls it.
+#[derive(Debug, Clone)]
+pub(crate) struct Named {
+    path: PathBuf,
+    name: String,
+}
+
 /// The files of a campaign, each once, in the order in which the campaign names them.
-pub(crate) fn inputs(campaign: &Campaign) -> Vec<Input> {
+pub(crate) fn files(campaign: &Campaign) -> Vec<Named> {
     let mut files: Vec<&Path> = Vec::new();
     for file in std::iter::once(campaign.source.as_path())
         .chain(campaign.runs.iter().map(|run| run.recording.source.as_path()))
@@ -21,7 +28,12 @@ pub(crate) fn inputs(campaign: &Campaign) -> Vec<Input> {
             files.push(file);
         }
     }
-    files.into_iter().map(|file| Input { file: name(file, campaign), crc32: crc32(file) }).collect()
+    files.into_iter().map(|file| Named { path: file.to_owned(), name: name(file, campaign) }).collect()
+}
+
+/// The checksums of files.
+pub(crate) fn sums(files: &[Named]) -> Vec<Input> {
+    files.iter().map(|f| Input { file: f.name.clone(), crc32: crc32(&f.path) }).collect()
 }
 
 /// A file as the campaign names it, so that a report does not depend on where the campaign lies.

@@ -1,0 +1,134 @@
+//! Whether the runs of a campaign are of one instrument, and each is of one piece: an angular gain for every run and for
+//! each half of it, compared.
+//!
+//! The angular gain of a device does not depend on the run. What may differ beside the noise of a run is its bias: a drift
+//! of the pattern, which a gain takes for its own at a steady rate.
+
+use crate::estimation::statistics::median;
+
+/// Gains agree within this share of themselves,
+const SHARE: f64 = 3e-3;
+/// and within what a drift of the pattern by this much makes of them, rad/s: 0.17 deg/s.
+const DRIFT_RAD_S: f64 = 3e-3;
+/// and within so many times what is left of the angle over the input that was turned through,
+const LEFT: f64 = 4.0;
+/// where no more than this counts, as a share of the period: what is left beyond it is no error of a readout.
+const LARGEST_LEFT: f64 = 0.03;
+/// Share of the runs that may be left out.
+const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
+
+/// What a run, or a part of it, tells of the angular gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gain {
+    /// k
+    pub(crate) value: f64,
+    /// how far it may be off
+    pub(crate) within: f64,
+}
+
+impl Gain {
+    /// A gain from a line that leaves `left`, rad, of an angle of this period over an input that covers `range`, rad, at a
+    /// mean speed, rad/s.
+    pub(crate) fn new(value: f64, left: f64, period: f64, range: f64, speed: f64) -> Self {
+        let by_readout = LEFT * left.min(LARGEST_LEFT * period) / range.max(f64::MIN_POSITIVE);
+        let by_drift = DRIFT_RAD_S / speed.max(f64::MIN_POSITIVE);
+        Self { value, within: SHARE * value.abs() + by_drift + by_readout }
+    }
+
+    pub(crate) fn agrees(&self, other: &Self) -> bool {
+        (self.value - other.value).abs() <= self.within.hypot(other.within)
+    }
+}
+
+/// What a run tells of the angular gain: all of it, and its parts in the order of time.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Told {
+    pub(crate) run: String,
+    pub(crate) all: Gain,
+    pub(crate) parts: Vec<Gain>,
+}
+
+impl Told {
+    /// Two parts that contradict each other.
+    fn contradiction(&self) -> Option<[Gain; 2]> {
+        let pairs = self.parts.iter().enumerate().flat_map(|(i, a)| self.parts[i + 1..].iter().map(move |b| [*a, *b]));
+        pairs
+            .filter(|[a, b]| !a.agrees(b))
+            .max_by(|x, y| (x[0].value - x[1].value).abs().total_cmp(&(y[0].value - y[1].value).abs()))
+    }
+}
+
+/// What the runs say of each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Verdict {
+    /// these are to be left out, and why; mostly none
+    Out(Vec<(usize, String)>),
+    /// the campaign cannot tell which of its runs is right
+    Open { run: String, problem: String },
+}
+
+/// Compares the runs of a campaign.
+pub(crate) fn verdict(runs: &[Told]) -> Verdict {
+    let middle = median(&mut runs.iter().map(|r| r.all.value).collect::<Vec<_>>());
+    // of runs that agree with the median: a median of two is one of them
+    let common = Gain { value: middle, within: 0.0 };
+    let mut odd: Vec<(usize, String)> = Vec::new();
+    for (i, run) in runs.iter().enumerate() {
+        if let Some([a, b]) = run.contradiction() {
+            let what = format!("its angular gain is {:.5} in one part and {:.5} in another", a.value, b.value);
+            odd.push((i, what));
+        } else if !run.all.agrees(&common) {
+            odd.push((i, format!("its angular gain is {:.5}, that of the other runs {middle:.5}", run.all.value)));
+        }
+    }
+    if odd.is_empty() || (odd.len() as f64) <= MOST_LEFT_OUT * runs.len() as f64 {
+        return Verdict::Out(odd);
+    }
+    let (first, what) = &odd[0];
+    let problem = if runs.len() == 1 || runs[*first].contradiction().is_some() {
+        format!("{what}: the clock, the rate, or what turns is not the same throughout")
+    } else {
+        let each: Vec<String> = runs.iter().map(|r| format!("{} {:.5}", r.run, r.all.value)).take(6).collect();
+        format!("the runs do not agree on the angular gain: {}", each.join(", "))
+    };
+    Verdict::Open { run: runs[*first].run.clone(), problem }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(run: &str, k: f64) -> Told {
+        let gain = |value| Gain::new(value, 0.004, std::f64::consts::PI, 170.0, 8.7);
+        Told { run: run.into(), all: gain(k), parts: vec![gain(k), gain(k)] }
+    }
+
+    #[test]
+    fn one_run_of_sixty_is_left_out_by_name() {
+        let mut runs: Vec<Told> = (0..60).map(|i| told(&format!("{i}.csv"), 0.78 + 1e-5 * f64::from(i))).collect();
+        runs[17].all.value = 0.75;
+        let Verdict::Out(out) = verdict(&runs) else { panic!() };
+        assert!(matches!(out.as_slice(), [(17, why)] if why.contains("0.75000")), "{out:?}");
+    }
+
+    #[test]
+    fn of_two_runs_neither_is_right() {
+        let Verdict::Open { problem, .. } = verdict(&[told("a.csv", 0.78), told("b.csv", 0.70)]) else { panic!() };
+        assert!(problem.contains("a.csv 0.78000, b.csv 0.70000"), "{problem}");
+    }
+
+    #[test]
+    fn a_run_that_changes_halfway_is_odd() {
+        let mut run = told("a.csv", 0.78);
+        run.parts[1].value = 0.74;
+        assert!(matches!(verdict(std::slice::from_ref(&run)), Verdict::Open { .. }));
+        let Verdict::Out(out) = verdict(&[told("b.csv", 0.78), run, told("c.csv", 0.78)]) else { panic!() };
+        assert_eq!(out.len(), 1);
+    }
+
+    #[test]
+    fn a_bias_at_a_slow_rate_is_no_disagreement() {
+        let slow = Gain::new(0.785, 0.004, std::f64::consts::PI, 170.0, 0.35);
+        assert!(slow.agrees(&Gain::new(0.78, 0.004, std::f64::consts::PI, 170.0, 8.7)));
+    }
+}

@@ -1,0 +1,420 @@
+//! Rows and columns that cannot be what they say: values that stood still while the table turned, a table angle and a rate
+//! that contradict each other.
+//!
+//! A value is *held* where it stays the same to the last bit while the input turns, and then makes up for it in one jump.
+//! A coarse converter stays the same as well, but jumps by its own step only; a table at rest does so with the input.
+
+use std::ops::Range;
+
+use crate::estimation::statistics::median;
+use crate::recording::{Channel, Recording};
+
+/// A held value makes up for it by more than this many of its usual smallest steps.
+const JUMP: f64 = 3.0;
+/// The smallest steps of a column: this share of all that are not zero are smaller.
+const SMALLEST: f64 = 0.05;
+/// So many rows in a row are held in one channel alone before it counts.
+const HELD_ALONE: usize = 5;
+/// More than this share of the rows of a recording cannot be lost from it, unless all of it is held alike.
+const MOST_LOST: f64 = 0.3;
+/// A recording is held throughout where this share of its values is of one age.
+const THROUGHOUT: f64 = 0.8;
+/// A value that is clipped stands still for more than this many times as long as a step of its converter makes it.
+const CLIPPED: f64 = 2.0;
+/// A table and a rate agree within this share.
+const AGREE: f64 = 0.02;
+/// A factor between them is a unit's within this share.
+const A_UNIT: f64 = 0.02;
+
+/// What was found wrong with a recording.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Findings {
+    /// what was mended by leaving rows out; each names the recording and the rows
+    pub(crate) warnings: Vec<String>,
+    /// why the recording serves for nothing
+    pub(crate) broken: Option<Broken>,
+}
+
+/// Why a recording serves for nothing.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Broken {
+    /// what is wrong
+    pub(crate) problem: String,
+    /// what would be right
+    pub(crate) wanted: String,
+}
+
+/// Leaves out of a recording the rows that were not recorded anew, and says what cannot be mended.
+pub(crate) fn mend(recording: &mut Recording) -> Findings {
+    let mut findings = Findings::default();
+    let name = recording.source.display().to_string();
+    if let Some(broken) = references(recording, &name, &mut findings.warnings) {
+        findings.broken = Some(broken);
+        return findings;
+    }
+    let rows = recording.len();
+    let held = held_rows(recording);
+    let lost: usize = held.iter().map(Range::len).sum();
+    if lost == 0 {
+        return findings;
+    }
+    let place = |r: &Range<usize>| {
+        let t = &recording.t_s;
+        format!("rows {} to {} ({:.3} s to {:.3} s)", r.start + 1, r.end, t[r.start], t[r.end - 1])
+    };
+    let mut longest: Vec<&Range<usize>> = held.iter().collect();
+    longest.sort_by_key(|r| (std::cmp::Reverse(r.len()), r.start));
+    let list: Vec<String> = longest.iter().take(3).map(|r| place(r)).collect();
+    let more = if held.len() > 3 { format!(" and {} more stretches", held.len() - 3) } else { String::new() };
+    let usual = median(&mut held.iter().map(|r| r.len() as f64).collect::<Vec<_>>());
+    let alike = held.iter().filter(|r| (r.len() as f64 - usual).abs() < 0.5).map(Range::len).sum::<usize>();
+    let throughout =
+        alike as f64 > THROUGHOUT * lost as f64 && held.len() as f64 * (usual + 1.0) > THROUGHOUT * rows as f64;
+    if throughout {
+        findings.warnings.push(format!(
+            "{name}: every value is held for {:.0} rows: the instrument was read more slowly than it was written; {lost} \
+             repeated rows are left out",
+            usual + 1.0
+        ));
+    } else if lost as f64 > MOST_LOST * rows as f64 {
+        findings.broken = Some(Broken {
+            problem: format!(
+                "{lost} of {rows} rows repeat the one before while the table turns: {}{more}",
+                list.join(", ")
+            ),
+            wanted: "a recording whose values are read anew for every row".into(),
+        });
+        return findings;
+    } else {
+        findings.warnings.push(format!(
+            "{name}: values stand still while the table turns: {}{more}; these {lost} rows are left out",
+            list.join(", ")
+        ));
+    }
+    leave_out(recording, &held);
+    findings
+}
+
+/// Rows that say what the row before says although the table turned: in all channels of the angle at once, in one of them,
+/// or in the table's own.
+pub(crate) fn held_rows(recording: &Recording) -> Vec<Range<usize>> {
+    let rows = recording.len();
+    let angle: Vec<Column<'_>> = [Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys, Channel::Theta]
+        .into_iter()
+        .filter_map(|c| Column::new(recording.channel(c)?, (c == Channel::Theta).then_some(180.0)))
+        .collect();
+    let table = recording.table_deg.as_deref().and_then(|v| Column::new(v, Some(360.0)));
+    let mut held = vec![false; rows];
+    let input = Input::of(recording);
+    let mut mark = |ranges: Vec<Range<usize>>| ranges.into_iter().for_each(|r| held[r].fill(true));
+    if !angle.is_empty() {
+        let all = repeats(rows, |i| angle.iter().all(|c| c.repeats(i)));
+        mark(all.into_iter().filter(|r| input.turns(r) && caught_up(angle.iter(), r, rows)).collect());
+    }
+    let main: Vec<&Column<'_>> = angle.iter().filter(|c| c.is_main).collect();
+    for (at, column) in main.iter().enumerate() {
+        let moves = |r: &Range<usize>| {
+            main.iter().enumerate().any(|(other, c)| other != at && c.moved(r.start - 1, r.end - 1) > JUMP)
+        };
+        let alone = repeats(rows, |i| column.repeats(i)).into_iter().filter(|r| r.len() + 1 >= HELD_ALONE);
+        let stuck = |r: &Range<usize>| {
+            let others = || main.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, c)| *c);
+            caught_up(std::iter::once(*column), r, rows) || column.clips(r, others())
+        };
+        mark(alone.filter(|r| moves(r) && stuck(r)).collect());
+    }
+    if let Some(table) = table.filter(|_| !main.is_empty()) {
+        let moves = |r: &Range<usize>| main.iter().any(|c| c.moved(r.start - 1, r.end - 1) > JUMP);
+        let stuck = repeats(rows, |i| table.repeats(i)).into_iter();
+        mark(stuck.filter(|r| moves(r) && caught_up(std::iter::once(&table), r, rows)).collect());
+    }
+    repeats(rows, |i| held[i])
+}
+
+/// One column and the size of its small steps.
+#[derive(Debug)]
+struct Column<'a> {
+    values: &'a [f64],
+    period: Option<f64>,
+    /// a small step, the smallest one, and a usual one
+    small: f64,
+    smallest: f64,
+    usual: f64,
+    /// smallest and largest value
+    span: [f64; 2],
+    is_main: bool,
+}
+
+impl<'a> Column<'a> {
+    /// `None` of a column that never changes.
+    fn new(values: &'a [f64], period: Option<f64>) -> Option<Self> {
+        let span = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
+        let mut column = Self { values, period, small: 0.0, smallest: 0.0, usual: 0.0, span, is_main: false };
+        let mut steps: Vec<f64> = (1..values.len()).map(|i| column.step(i - 1, i)).filter(|d| *d > 0.0).collect();
+        if steps.is_empty() {
+            return None;
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+        let small = (SMALLEST * steps.len() as f64) as usize;
+        column.small = *steps.select_nth_unstable_by(small, f64::total_cmp).1;
+        column.smallest = steps[..=small].iter().copied().fold(f64::INFINITY, f64::min);
+        column.usual = median(&mut steps);
+        // what hardly moves in all is noise around a constant, and no part of the angle
+        column.is_main = span[1] - span[0] > 30.0 * column.small;
+        Some(column)
+    }
+
+    fn step(&self, from: usize, to: usize) -> f64 {
+        let d = self.values[to] - self.values[from];
+        self.period.map_or(d, |p| d - p * (d / p).round()).abs()
+    }
+
+    fn repeats(&self, i: usize) -> bool {
+        #[allow(clippy::float_cmp, reason = "the same to the last bit is the point")]
+        let same = self.values[i] == self.values[i - 1];
+        same
+    }
+
+    /// Whether it stands at its largest or smallest value while another moves by more than it would around the top of a
+    /// circle that is read in steps: cos φ stays within a step q of 1 for |φ| < √(2q).
+    #[allow(clippy::float_cmp, reason = "the same to the last bit is the point")]
+    fn clips<'b>(&self, rows: &Range<usize>, mut others: impl Iterator<Item = &'b Column<'b>>) -> bool {
+        let at_end = self.span.contains(&self.values[rows.start]);
+        let amplitude = 0.5 * (self.span[1] - self.span[0]);
+        let flat = 2.0 * (2.0 * self.smallest / amplitude).sqrt();
+        at_end && others.any(|c| c.step(rows.start - 1, rows.end - 1) > CLIPPED * flat * 0.5 * (c.span[1] - c.span[0]))
+    }
+
+    /// How far it moved, in its small steps.
+    fn moved(&self, from: usize, to: usize) -> f64 {
+        self.step(from, to) / self.small
+    }
+}
+
+/// Whether values that stood still over a range of rows made up for it afterwards in one jump; at the end of a recording,
+/// whether they usually step by more than their smallest step.
+fn caught_up<'a>(mut columns: impl Iterator<Item = &'a Column<'a>>, held: &Range<usize>, rows: usize) -> bool {
+    columns.any(|c| if held.end < rows { c.moved(held.end - 1, held.end) > JUMP } else { c.usual > JUMP * c.small })
+}
+
+/// Ranges of rows, the first row of a recording aside, for which `is` holds.
+fn repeats(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for i in (1..rows).filter(|i| is(*i)) {
+        match out.last_mut() {
+            Some(last) if last.end == i => last.end = i + 1,
+            _ => out.push(i..i + 1),
+        }
+    }
+    out
+}
+
+/// Whether the table turns, by whatever was recorded of it.
+struct Input<'a> {
+    rate: Option<&'a [f64]>,
+    table: Option<&'a [f64]>,
+}
+
+impl<'a> Input<'a> {
+    fn of(recording: &'a Recording) -> Self {
+        Self { rate: recording.rate_dps.as_deref(), table: recording.table_deg.as_deref() }
+    }
+
+    #[allow(clippy::float_cmp, reason = "a table at rest is recorded as such")]
+    fn turns(&self, rows: &Range<usize>) -> bool {
+        let by_rate = self.rate.is_some_and(|v| v[rows.clone()].iter().any(|r| *r != 0.0));
+        let by_table = self.table.is_some_and(|v| v[rows.start - 1] != v[rows.end - 1]);
+        if self.table.is_some() { by_table } else { by_rate }
+    }
+}
+
+/// Takes rows out of every channel. Columns of unknown meaning go: nothing here asks for them.
+fn leave_out(recording: &mut Recording, held: &[Range<usize>]) {
+    let mut keep = vec![true; recording.len()];
+    held.iter().for_each(|r| keep[r.clone()].fill(false));
+    for channel in Channel::ALL {
+        if let Some(values) = recording.channel(channel) {
+            let kept = values.iter().zip(&keep).filter(|(_, k)| **k).map(|(v, _)| *v).collect();
+            recording.set_channel(channel, kept);
+        }
+    }
+    recording.unknown.clear();
+}
+
+/// Whether the table's angle and the rate tell of the same rotation, where both were recorded. The angle is what counts: a
+/// rate in another unit, or with another sign, is said and passed over.
+fn references(recording: &Recording, name: &str, warnings: &mut Vec<String>) -> Option<Broken> {
+    let (table, rate, t) = (recording.table_deg.as_deref()?, recording.rate_dps.as_deref()?, &recording.t_s);
+    // the step of the table that the rate predicts, where neither is near half a turn nor at rest
+    let fastest = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    let mut factors: Vec<f64> = (1..t.len())
+        .filter(|&i| rate[i - 1].abs().min(rate[i].abs()) > 0.1 * fastest && rate[i - 1] * rate[i] > 0.0)
+        .filter_map(|i| {
+            let by_rate = 0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]);
+            let step = table[i] - table[i - 1];
+            let by_table = step - 360.0 * (step / 360.0).round();
+            (by_rate.abs() < 90.0 && by_table.abs() < 90.0).then(|| by_table / by_rate)
+        })
+        .filter(|f| f.is_finite())
+        .collect();
+    if factors.len() < 16 {
+        return None;
+    }
+    let factor = median(&mut factors);
+    let mut off: Vec<f64> = factors.iter().map(|f| (f - factor).abs()).collect();
+    // how sure the median is of itself: noise of a fast recording is larger than its steps
+    let unsure = 3.0 * median(&mut off) / (factors.len() as f64).sqrt();
+    let is = |wanted: f64| (factor / wanted - 1.0).abs() <= A_UNIT + unsure;
+    if (factor - 1.0).abs() <= AGREE + unsure {
+        return None;
+    }
+    let unit = [
+        (57.295_78, "rad/s"),
+        (6.0, "revolutions per minute"),
+        (360.0, "revolutions per second"),
+        (1e-3, "mdeg/s"),
+        (1.0 / 3600.0, "deg/h"),
+    ];
+    for (size, what) in unit {
+        for sign in [1.0, -1.0] {
+            if is(sign * size) {
+                let also = if sign < 0.0 { " and counts the other way" } else { "" };
+                warnings.push(format!(
+                    "{name}: rate_dps is {factor:.4} of what table_deg says, as if in {what}{also}; table_deg is used"
+                ));
+                return None;
+            }
+        }
+    }
+    if is(-1.0) {
+        warnings.push(format!("{name}: rate_dps counts the other way than table_deg, which is used"));
+        return None;
+    }
+    Some(Broken {
+        problem: format!("table_deg turns {factor:.4} times as fast as rate_dps says"),
+        wanted: "references that agree, or only the one that is right (the other column renamed)".into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 s at 500 deg/s and 100 Hz, k = 0.78, with the noise of a good readout.
+    fn recorded() -> Recording {
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            2e-5 * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
+        };
+        let t_s: Vec<f64> = (0..2000).map(|i| 0.01 * f64::from(i)).collect();
+        let theta = |t: f64| 0.3 - 0.78 * (500.0 * t).to_radians();
+        Recording {
+            source: "run.csv".into(),
+            rate_dps: Some(vec![500.0; 2000]),
+            xc_v: Some(t_s.iter().map(|t| theta(*t).cos() + noise()).collect()),
+            yc_v: Some(t_s.iter().map(|t| 1.0132 * theta(*t).sin() + noise()).collect()),
+            t_s,
+            ..Recording::default()
+        }
+    }
+
+    fn hold(recording: &mut Recording, rows: Range<usize>) {
+        for v in [&mut recording.xc_v, &mut recording.yc_v].into_iter().flatten() {
+            let value = v[rows.start];
+            v[rows.clone()].fill(value);
+        }
+    }
+
+    #[test]
+    fn a_sound_recording_is_left_alone() {
+        let mut recording = recorded();
+        assert_eq!(mend(&mut recording), Findings::default());
+        assert_eq!(recording.len(), 2000);
+    }
+
+    #[test]
+    fn rows_that_repeat_while_the_table_turns_are_named_and_left_out() {
+        for rows in [700..705, 700..730, 1990..2000] {
+            let mut recording = recorded();
+            hold(&mut recording, rows.clone());
+            let findings = mend(&mut recording);
+            assert_eq!(findings.broken, None);
+            assert_eq!(recording.len(), 2000 - rows.len() + 1, "the first of them was recorded");
+            let said = format!("rows {} to {} ", rows.start + 2, rows.end);
+            assert!(findings.warnings[0].contains(&said), "{:?}", findings.warnings);
+        }
+    }
+
+    #[test]
+    fn a_table_at_rest_is_not_a_recording_that_stands_still() {
+        let mut recording = recorded();
+        hold(&mut recording, 700..730);
+        if let Some(rate) = &mut recording.rate_dps {
+            rate[700..730].fill(0.0);
+        }
+        assert!(held_rows(&recording).is_empty());
+    }
+
+    #[test]
+    fn a_coarse_converter_is_not_a_recording_that_stands_still() {
+        for rate in [20.0, 500.0] {
+            for step in [2.5 / 128.0, 2.5 / 2048.0] {
+                let mut recording = recorded();
+                let theta = |t: f64| 0.3 - 0.78 * (rate * t).to_radians();
+                let counted = |v: f64| (v / step).round() * step;
+                recording.rate_dps = Some(vec![rate; 2000]);
+                recording.xc_v = Some(recording.t_s.iter().map(|t| counted(theta(*t).cos())).collect());
+                recording.yc_v = Some(recording.t_s.iter().map(|t| counted(theta(*t).sin())).collect());
+                assert!(held_rows(&recording).is_empty(), "{rate} {step}: {:?}", held_rows(&recording));
+                let degrees = recording.t_s.iter().map(|t| (theta(*t).to_degrees() / 5.0).floor() * 5.0);
+                recording.theta_deg = Some(degrees.map(|d| d.rem_euclid(180.0)).collect());
+                (recording.xc_v, recording.yc_v) = (None, None);
+                assert!(held_rows(&recording).is_empty(), "{rate}: {:?}", held_rows(&recording));
+            }
+        }
+    }
+
+    #[test]
+    fn values_held_throughout_are_a_slower_recording() {
+        let mut recording = recorded();
+        (0..500).for_each(|i| hold(&mut recording, 4 * i..4 * i + 4));
+        let findings = mend(&mut recording);
+        assert!(findings.warnings[0].contains("held for 4 rows"), "{findings:?}");
+        assert_eq!(recording.len(), 500);
+    }
+
+    #[test]
+    fn half_a_recording_that_stands_still_serves_for_nothing() {
+        let mut recording = recorded();
+        for (i, length) in [(0, 300), (500, 400), (1100, 250)] {
+            hold(&mut recording, i..i + length);
+        }
+        assert!(mend(&mut recording).broken.is_some_and(|b| b.problem.contains("947 of 2000 rows")));
+    }
+
+    #[test]
+    fn a_channel_that_is_clipped_is_left_out_where_it_is() {
+        let mut recording = recorded();
+        recording.xc_v.iter_mut().flatten().for_each(|v| *v = v.clamp(-0.8, 0.8));
+        let findings = mend(&mut recording);
+        assert!(findings.broken.is_some_and(|b| b.problem.contains("rows repeat")));
+    }
+
+    #[test]
+    fn references_that_disagree_serve_for_nothing_and_a_unit_is_named() {
+        let with_table = |factor: f64| {
+            let mut recording = recorded();
+            let table = recording.t_s.iter().map(|t| (500.0 * t * factor).rem_euclid(360.0));
+            recording.table_deg = Some(table.collect());
+            recording
+        };
+        assert_eq!(mend(&mut with_table(1.0)), Findings::default());
+        let broken = mend(&mut with_table(0.5)).broken;
+        assert!(broken.is_some_and(|b| b.problem.contains("0.5000 times")));
+        let mut radians = with_table(1.0);
+        radians.rate_dps = Some(vec![500f64.to_radians(); 2000]);
+        let findings = mend(&mut radians);
+        assert!(findings.broken.is_none() && findings.warnings[0].contains("rad/s"), "{findings:?}");
+    }
+}

@@ -1,0 +1,296 @@
+//! Which runs can be believed: each is looked at by itself, then all beside each other, before anything is fitted.
+//!
+//! What is broken in a run is left out, rows or all of it, and named; what cannot be told from being right is refused.
+
+use crate::data::agreement::{Gain, Told, Verdict, verdict};
+use crate::data::plausibility::mend;
+use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, sampling, spread_over};
+use crate::data::slips::slips;
+use crate::data::track::{Track, run_name, wrapped};
+use crate::error::Refusal;
+use crate::estimation::initial_guess::{Guess, Motion, bearings, motion};
+use crate::model::hypothesis::Hypothesis;
+use crate::recording::{Instrument, Role, Run};
+use crate::report::RunReport;
+
+/// Angular gains that can be stated at all.
+const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// Share of the runs that may be left out because they are broken in themselves.
+const MOST_BROKEN: f64 = 0.5;
+/// A run with more slips than this has no clock.
+const MOST_SLIPS: usize = 8;
+/// An angle that scatters by more than this share of its period about its line does not follow the input.
+const LOST: f64 = 0.2;
+
+/// Which runs are in, and which were left out and why.
+#[derive(Debug, Default)]
+pub(crate) struct Screen {
+    stated: Option<f64>,
+    /// the samples are so far apart that only what is settled may be followed
+    far_apart: bool,
+    /// numbers of the rotation runs that are in
+    pub(crate) kept: Vec<usize>,
+    /// numbers of those that are not
+    pub(crate) left_out: Vec<usize>,
+    rotations: usize,
+}
+
+/// The angular gain that a campaign states, if it is one.
+///
+/// # Errors
+/// Where no instrument has it.
+pub(crate) fn stated(gain: &Option<f64>) -> Result<Option<f64>, Refusal> {
+    match gain {
+        Some(k) if !STATABLE.contains(&k.abs()) => {
+            Err(Refusal::new("campaign", format!("angular_gain = {k:e}"), "a gain between 0.001 and 1000"))
+        }
+        other => Ok(*other),
+    }
+}
+
+impl Screen {
+    /// The screen of a campaign with so many rotation runs.
+    pub(crate) fn new(stated: Option<f64>, rotations: usize) -> Self {
+        Self { stated, kept: (0..rotations).collect(), rotations, ..Self::default() }
+    }
+
+    /// What is known of the angular gain where the hypothesis has `k`.
+    pub(crate) fn guess(&self, k: f64) -> Guess {
+        if self.far_apart { Guess::Settled(k) } else { Guess::Open(Some(k)) }
+    }
+
+    /// The angular gain that the campaign states.
+    pub(crate) fn stated(&self) -> Option<f64> {
+        self.stated
+    }
+
+    /// Of reports of all runs, those of the rotations that are in, in the order of the tracks.
+    pub(crate) fn of<'a>(&self, runs: &'a mut [RunReport]) -> Vec<&'a mut RunReport> {
+        Self::chosen(&self.kept, runs)
+    }
+
+    /// Of reports of all runs, those of the rotations that were left out.
+    pub(crate) fn left_out_of<'a>(&self, runs: &'a mut [RunReport]) -> Vec<&'a mut RunReport> {
+        Self::chosen(&self.left_out, runs)
+    }
+
+    fn chosen<'a>(numbers: &[usize], runs: &'a mut [RunReport]) -> Vec<&'a mut RunReport> {
+        let rotations = runs.iter_mut().filter(|r| r.kind == "rotation").enumerate();
+        rotations.filter(|(number, _)| numbers.contains(number)).map(|(_, run)| run).collect()
+    }
+
+    /// Leaves out run `number` of all.
+    fn leave_out(&mut self, number: usize, run: &str, why: &str, warnings: &mut Vec<String>) {
+        warnings.push(format!("{run}: left out: {why}"));
+        self.kept.retain(|n| *n != number);
+        self.left_out.push(number);
+    }
+
+    /// Rows that were not recorded anew left out of the runs, and runs that serve for nothing.
+    ///
+    /// # Errors
+    /// Where too few are left.
+    pub(crate) fn mended(&mut self, runs: Vec<Run>, warnings: &mut Vec<String>) -> Result<Vec<Run>, Refusal> {
+        let mut broken = Vec::new();
+        let mut sound = Vec::new();
+        for (number, mut run) in runs.into_iter().enumerate() {
+            let findings = mend(&mut run.recording);
+            warnings.extend(findings.warnings);
+            match findings.broken {
+                Some(what) => broken.push((number, run_name(&run), what)),
+                None => sound.push(run),
+            }
+        }
+        let fitted = sound.iter().filter(|r| r.role == Role::Fit).count();
+        let too_many = fitted == 0 || broken.len() as f64 > MOST_BROKEN * self.rotations as f64;
+        if let Some((_, name, what)) = broken.first().filter(|_| too_many) {
+            return Err(Refusal::no_answer(name, &what.problem, &what.wanted));
+        }
+        for (number, name, what) in broken {
+            self.leave_out(number, &name, &what.problem, warnings);
+        }
+        Ok(sound)
+    }
+
+    /// How each run moves, of those that can be believed.
+    ///
+    /// # Errors
+    /// Where the samples are too far apart to tell, where the angle does not follow the input, or where the runs contradict
+    /// each other.
+    pub(crate) fn motions(
+        &mut self,
+        tracks: Vec<Track>,
+        start: &Hypothesis,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<(Track, Motion)>, Refusal> {
+        let open = Guess::Open(self.stated);
+        let first: Vec<Motion> = tracks.iter().map(|t| motion(t, start, open)).collect::<Result<_, _>>()?;
+        let guess = self.settle(&tracks, &first, start)?;
+        let mut moving: Vec<(Track, Motion)> = Vec::with_capacity(tracks.len());
+        let mut odd: Vec<(usize, String)> = Vec::new();
+        for (at, (mut track, mut moves)) in tracks.into_iter().zip(first).enumerate() {
+            if guess != open {
+                moves = motion(&track, start, guess)?;
+            }
+            match cut_at_slips(&mut track, start, &moves, warnings) {
+                Ok(true) => moves = motion(&track, start, guess)?,
+                Ok(false) => {}
+                Err(why) => odd.push((at, why)),
+            }
+            if start.instrument == Instrument::Gyroscope && moves.deviation > LOST * start.period_rad {
+                odd.retain(|o| o.0 != at);
+                odd.push((at, "its angle does not follow the input at all".into()));
+            }
+            moving.push((track, moves));
+        }
+        if odd.len() as f64 > MOST_BROKEN * moving.len() as f64 {
+            let (at, why) = &odd[0];
+            return Err(Refusal::no_answer(
+                &moving[*at].0.name,
+                why,
+                "rate_dps or table_deg of this very rotation, one clock, and xc_v, yc_v or theta_deg of the instrument that \
+                 was turned",
+            ));
+        }
+        let mut moving = self.without(moving, &odd, warnings);
+        if start.instrument == Instrument::Gyroscope {
+            let told: Vec<Told> = moving.iter().map(|(t, m)| told(t, m, start.period_rad)).collect();
+            match verdict(&told) {
+                Verdict::Out(odd) => moving = self.without(moving, &odd, warnings),
+                Verdict::Open { run, problem } => {
+                    return Err(Refusal::no_answer(
+                        &run,
+                        problem,
+                        "runs of one instrument, each with its own rate_dps or table_deg; a third run tells which of two \
+                         is right",
+                    ));
+                }
+            }
+            self.counts_as_stated(&moving)?;
+        }
+        Ok(moving)
+    }
+
+    /// The runs without those at these places.
+    fn without(
+        &mut self,
+        moving: Vec<(Track, Motion)>,
+        odd: &[(usize, String)],
+        warnings: &mut Vec<String>,
+    ) -> Vec<(Track, Motion)> {
+        let numbers = self.kept.clone();
+        for (at, why) in odd {
+            self.leave_out(numbers[*at], &moving[*at].0.name.clone(), why, warnings);
+        }
+        let out = |at: usize| odd.iter().any(|o| o.0 == at);
+        moving.into_iter().enumerate().filter(|(at, _)| !out(*at)).map(|(_, run)| run).collect()
+    }
+
+    /// Settles the angular gain where samples are so far apart that neighbours do not tell it.
+    fn settle(&mut self, tracks: &[Track], first: &[Motion], start: &Hypothesis) -> Result<Guess, Refusal> {
+        let plausible = match (self.stated, start.instrument) {
+            (Some(k), _) => Plausible::Stated(k),
+            (None, Instrument::Gyroscope) => Plausible::Resonator,
+            (None, Instrument::Sensor) => Plausible::Encoder,
+        };
+        let steps: Vec<Steps> = tracks.iter().map(|t| steps(t, start)).collect();
+        let followed = |i: usize| first.get(i).map(|m| m.angular_gain);
+        match sampling(&steps, followed, (start.sense(), start.period_rad), plausible) {
+            Sampling::Close => Ok(Guess::Open(self.stated)),
+            Sampling::Resolved(k) => {
+                self.far_apart = true;
+                Ok(Guess::Settled(k))
+            }
+            Sampling::Ambiguous(a) => Err(Refusal::no_answer(&a.run, a.problem(), a.wanted())),
+        }
+    }
+
+    /// The angle counts the way that the campaign says, or that Equation 1 says.
+    fn counts_as_stated(&self, moving: &[(Track, Motion)]) -> Result<(), Refusal> {
+        let expected = self.stated.unwrap_or(LARGEST_GAIN);
+        let against = |(t, m): &&(Track, Motion)| t.has_amplitude() && m.angular_gain * expected < 0.0;
+        let Some((track, motion)) = moving.iter().find(against) else { return Ok(()) };
+        Err(Refusal::no_answer(
+            &track.name,
+            format!("the angle counts with the rotation and not against it: k = {:.4}", motion.angular_gain),
+            format!(
+                "X and Y in their places (xc_v and yc_v may be swapped, or one may have lost its sign), rate_dps or \
+                 table_deg with its sign, or angular_gain = {:.2} in the [campaign] if this is how it counts",
+                motion.angular_gain
+            ),
+        ))
+    }
+}
+
+/// Steps between neighbouring samples of a track, evenly from all of it.
+fn steps(track: &Track, hypothesis: &Hypothesis) -> Steps {
+    let all = bearings(track, hypothesis, 1);
+    let mut out = Steps { name: track.name.clone(), ..Steps::default() };
+    let mut intervals = Vec::new();
+    let count: usize = all.iter().map(Vec::len).sum();
+    let every = spread_over(count).nth(1).unwrap_or(1);
+    for (segment, bearing) in track.segments.iter().zip(&all) {
+        for i in (1..bearing.len()).step_by(every) {
+            let at = segment.range.start + i;
+            let input = track.input_rad[at] - track.input_rad[at - 1];
+            if input.abs() > 1e-9 {
+                out.input.push(input);
+                out.angle.push(bearing[i] - bearing[i - 1]);
+                intervals.push(track.t_s[at] - track.t_s[at - 1]);
+            }
+        }
+    }
+    out.interval_s = crate::estimation::statistics::median(&mut intervals);
+    out
+}
+
+/// What a run tells of the angular gain.
+fn told(track: &Track, motion: &Motion, period: f64) -> Told {
+    let (low, high) = track
+        .segments
+        .iter()
+        .flat_map(|s| [s.range.start, s.range.end - 1])
+        .map(|i| track.input_rad[i])
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let all = Gain::new(motion.angular_gain, motion.deviation, period, high - low, track.mean_speed());
+    Told { run: track.name.clone(), all, parts: motion.halves.clone() }
+}
+
+/// Ends a segment where the angle jumps against the input, and begins another; says where, and whether there was any.
+///
+/// # Errors
+/// Why the run has no clock.
+fn cut_at_slips(
+    track: &mut Track,
+    hypothesis: &Hypothesis,
+    motion: &Motion,
+    warnings: &mut Vec<String>,
+) -> Result<bool, String> {
+    let along = hypothesis.sense() * motion.angular_gain;
+    let mut found = Vec::new();
+    for (segment, bearing) in track.segments.iter().zip(bearings(track, hypothesis, 1)) {
+        let expected: Vec<f64> = segment.range.clone().map(|i| along * track.input_rad[i]).collect();
+        let here = slips(&bearing, &expected, hypothesis.period_rad);
+        found.extend(here.into_iter().map(|s| (segment.range.start + s.at, s.by)));
+    }
+    let Some(&(first, by)) = found.first() else { return Ok(false) };
+    let place = |row: usize| format!("row {} ({:.3} s)", row + 1, track.t_s[row]);
+    if found.len() > MOST_SLIPS {
+        return Err(format!(
+            "its angle jumps against the input {} times, first by {:.2}° at {}: the clock slips, or samples are lost",
+            found.len(),
+            wrapped(by, hypothesis.period_rad).to_degrees(),
+            place(first)
+        ));
+    }
+    let places: Vec<String> =
+        found.iter().map(|(row, by)| format!("by {:.2}° at {}", by.to_degrees(), place(*row))).collect();
+    warnings.push(format!(
+        "{}: the angle jumps against the input {}: the clock slips there, or samples are lost; what comes before and after \
+         is followed apart",
+        track.name,
+        places.join(", ")
+    ));
+    track.cut(&found.iter().map(|f| f.0).collect::<Vec<_>>());
+    Ok(true)
+}

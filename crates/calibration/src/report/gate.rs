@@ -1,0 +1,150 @@
+//! The gate that every number passes before it leaves the program: finite, possible, counted on enough samples. What does
+//! not pass is no answer, and its reason is said.
+
+use cvg_model::effects::Role as ParameterRole;
+
+use crate::data::sampling::LARGEST_GAIN;
+use crate::error::Refusal;
+use crate::model::hypothesis::Member;
+use crate::recording::Instrument;
+use crate::report::calibration::Calibration;
+use crate::report::{Estimate, Report};
+
+/// A held-out error is counted on at least this many samples.
+const LEAST_HELD_OUT: usize = 16;
+/// An error beyond this share of the angle's period is no error of an angle that is followed.
+const LARGEST_ERROR: f64 = 0.1;
+/// The smallest angular gain of a resonator: modes of high order are carried along least.
+const SMALLEST_GAIN: f64 = 0.01;
+/// An angular gain that is known no better than to this share of itself is not told.
+const WIDEST_GAIN: f64 = 0.2;
+/// Gains of gyroscopes that are built: what a unit would have to bring the gain to.
+const USUAL_GAIN: std::ops::RangeInclusive<f64> = 0.2..=LARGEST_GAIN;
+
+/// What the gate is told beside the report.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Facts {
+    pub(crate) instrument: Instrument,
+    pub(crate) period_deg: f64,
+    /// the angular gain that the campaign states
+    pub(crate) stated: Option<f64>,
+    /// held-out samples that errors were counted on
+    pub(crate) held_out: usize,
+    /// error of the fitted samples, deg rms
+    pub(crate) fitted_rms_deg: f64,
+}
+
+/// Whether an identification may leave the program.
+///
+/// # Errors
+/// [`Refusal`] without an answer, with what is wrong and what would help.
+pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> Result<(), Refusal> {
+    let refuse = |problem: String, wanted: &str| Err(Refusal::no_answer(&report.device, problem, wanted));
+    if facts.held_out < LEAST_HELD_OUT {
+        return refuse(
+            format!("only {} samples are left to measure an error on that nothing was fitted to", facts.held_out),
+            "a longer run, or one with use = \"holdout\"",
+        );
+    }
+    if let Some(what) = unreal(report) {
+        return refuse(
+            format!("the fit of {what} did not converge to a number"),
+            "other runs, or fewer of them at once",
+        );
+    }
+    angular_gain(report, facts)?;
+    let errors = [report.heldout.discovered.rms_deg, facts.fitted_rms_deg];
+    if let Some(rms) = errors.into_iter().find(|rms| *rms > LARGEST_ERROR * facts.period_deg) {
+        return refuse(
+            format!("the angle is not followed: the model is off by {rms:.0}°"),
+            "rate_dps or table_deg, and the signs and scales of the channels, as the campaign says",
+        );
+    }
+    if let Some(what) = calibration.hypothesis.members.iter().find_map(at_its_limit) {
+        return refuse(
+            format!("{what} is at its limit: what is fitted is not what was recorded"),
+            "channels in volts, X and Y in their places, an angle that follows the input",
+        );
+    }
+    let text = calibration.to_text();
+    if let Err(why) = Calibration::from_text(&text, "the calibration") {
+        return refuse(format!("what was found is no calibration: {why}"), "other runs");
+    }
+    Ok(())
+}
+
+/// The first number of a report that is none.
+fn unreal(report: &Report) -> Option<String> {
+    let whole = |e: &Estimate| e.value.is_finite() && e.ci95.iter().all(|v| v.is_finite()) && e.ci95[0] <= e.ci95[1];
+    let named = [
+        ("angular_gain", Some(report.angular_gain)),
+        ("detection_gain_ratio", report.detection_gain_ratio),
+        ("actuation_gain_ratio", report.actuation_gain_ratio),
+    ];
+    if let Some((name, _)) = named.into_iter().find(|(_, e)| e.is_some_and(|e| !whole(&e))) {
+        return Some(name.into());
+    }
+    let h = &report.heldout;
+    let errors = [h.raw.unwrap_or_default(), h.declared, h.discovered];
+    if !errors.iter().all(|e| e.rms_deg.is_finite() && e.peak_deg.is_finite()) || !h.noise_floor_deg.is_finite() {
+        return Some("heldout".into());
+    }
+    report.effects.iter().find_map(|e| {
+        let sound = |v: &f64| v.is_finite();
+        let of = e.parameters.iter().find(|p| !sound(&p.value) || p.ci95.is_some_and(|c| !c.iter().all(sound)))?;
+        Some(format!("{} of {}", of.name, e.id))
+    })
+}
+
+/// An angular gain is told, and one that the instrument can have.
+fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
+    let k = report.angular_gain;
+    if k.half_width() > WIDEST_GAIN * k.value.abs() {
+        return Err(Refusal::no_answer(
+            &report.device,
+            format!("the angular gain is not told: {:.4} ± {:.1e}", k.value, k.half_width()),
+            "runs at other rates and in both directions, or faster ones",
+        ));
+    }
+    let possible = match facts.stated {
+        Some(stated) => (0.5..2.0).contains(&(k.value / stated).abs()),
+        None => facts.instrument == Instrument::Sensor || (SMALLEST_GAIN..=LARGEST_GAIN).contains(&k.value.abs()),
+    };
+    if possible {
+        return Ok(());
+    }
+    let suggestion = unit(k.value, facts.stated).unwrap_or("rates in deg/s, angles in deg and times in s").to_owned();
+    let problem = facts.stated.map_or_else(
+        || format!("an angular gain of {:.4e} is none that a gyroscope can have", k.value),
+        |stated| format!("the angular gain is {:.4e}, and the campaign states {stated}", k.value),
+    );
+    Err(Refusal::no_answer(&report.device, problem, suggestion))
+}
+
+/// The unit in which rates, angles or times would have to be for a gain to be possible.
+fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
+    const UNITS: [(f64, &str); 6] = [
+        (57.295_78, "rate_dps in deg/s: it looks as if in rad/s (rate_dps = \"…*57.29578\" in [columns], or by --map)"),
+        (
+            6.0,
+            "rate_dps in deg/s: it looks as if in revolutions per minute (rate_dps = \"…*6\" in [columns], or by --map)",
+        ),
+        (360.0, "rate_dps in deg/s: it looks as if in revolutions per second (rate_dps = \"…*360\")"),
+        (1e-3, "t_s in s: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map), or rate_dps in mdeg/s"),
+        (1e-6, "t_s in s: it looks as if in µs (t_s = \"…*0.000001\" in [columns], or by --map)"),
+        (1.0 / 3600.0, "rate_dps in deg/s: it looks as if in deg/h"),
+    ];
+    let usual = |k: f64| stated.map_or(USUAL_GAIN.contains(&k.abs()), |s| (k / s - 1.0).abs() < 0.2);
+    UNITS.iter().find(|(factor, _)| usual(k / factor)).map(|(_, what)| *what)
+}
+
+/// A fitted parameter at a bound that is not its neutral value.
+fn at_its_limit(member: &Member) -> Option<String> {
+    let neutral = member.id.neutral::<f64>();
+    let parameters = member.id.description().parameters.iter().zip(member.values).zip(neutral);
+    #[allow(clippy::float_cmp, reason = "a bound is reached exactly")]
+    parameters
+        .filter(|((p, _), _)| !matches!(p.role, ParameterRole::Searched(_) | ParameterRole::Located(_)))
+        .find(|((p, value), neutral)| value != neutral && (*value == p.lower || *value == p.upper))
+        .map(|((p, _), _)| format!("{} of {}", p.name, member.id))
+}

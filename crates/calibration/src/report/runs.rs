@@ -1,0 +1,97 @@
+//! What each run tells by itself once everything else is known: its angular gain, its bias, its error.
+
+use crate::data::agreement::Gain;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
+use crate::estimation::fit::{Fit, Residual, Window, residuals};
+use crate::estimation::joint_fit::Bench;
+use crate::recording::Role;
+use crate::report::{Estimate, RunReport};
+
+/// A slope and its standard deviation, from sums over segments that have a level each.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slope {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    count: f64,
+    range: f64,
+}
+
+impl Slope {
+    fn add(&mut self, x: &[f64], y: &[f64], kept: &[bool]) {
+        let kept = || x.iter().zip(y).zip(kept).filter(|(_, k)| **k).map(|(p, _)| p);
+        let n = kept().count() as f64;
+        if n < 3.0 {
+            return;
+        }
+        let (mx, my) = kept().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (x, y) in kept() {
+            (self.xx, self.xy, self.yy) =
+                (self.xx + (x - mx).powi(2), self.xy + (x - mx) * (y - my), self.yy + (y - my).powi(2));
+            (low, high) = (low.min(*x), high.max(*x));
+        }
+        self.count += n;
+        self.range = self.range.max(high - low);
+    }
+
+    /// Value, standard deviation where the error's memory multiplies variances by `memory`, and rms of what is left.
+    fn told(&self, memory: f64) -> Option<[f64; 3]> {
+        let value = self.xy / self.xx;
+        let left = (self.yy - value * self.xy).max(0.0) / (self.count - 2.0).max(1.0);
+        let told = [value, (memory * left / self.xx).sqrt(), left.sqrt()];
+        told.iter().all(|v| v.is_finite()).then_some(told)
+    }
+}
+
+/// Fills in what every run that was fitted or held out tells by itself; says which of them do not agree with the rest.
+pub(crate) fn tell_apart(
+    runs: &mut [RunReport],
+    bench: &Bench,
+    fit: &Fit,
+    (on_fit, held_out): (&Evaluation, &Evaluation),
+) -> Vec<String> {
+    let memory = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
+    let left: [Vec<Vec<Residual>>; 2] = [Role::Fit, Role::Holdout]
+        .map(|role| residuals(&bench.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole));
+    let mut warnings = Vec::new();
+    for (at, (run, track)) in bench.screen.of(runs).into_iter().zip(&bench.tracks).enumerate() {
+        let fitted = !left[0][at].is_empty();
+        let (residuals, evaluation) = if fitted { (&left[0][at], on_fit) } else { (&left[1][at], held_out) };
+        let kept: Vec<&Vec<bool>> =
+            evaluation.segments.iter().zip(&evaluation.kept).filter(|(s, _)| s.track == at).map(|(_, k)| k).collect();
+        let (mut of_input, mut of_time) = (Slope::default(), Slope::default());
+        for (r, kept) in residuals.iter().zip(&kept) {
+            of_input.add(&r.turned, &r.angle, kept);
+            of_time.add(&r.t_s, &r.angle, kept);
+        }
+        run.spikes = [on_fit, held_out]
+            .iter()
+            .flat_map(|e| e.segments.iter().zip(&e.kept))
+            .filter(|(s, _)| s.track == at)
+            .map(|(_, k)| k.iter().filter(|k| !**k).count())
+            .sum();
+        let (Some([slope, deviation, rms]), Some([drift, drift_deviation, _])) =
+            (of_input.told(memory), of_time.told(memory))
+        else {
+            continue;
+        };
+        let k = fit.hypothesis.angular_gain;
+        let own = k + fit.hypothesis.sense() * slope;
+        run.angular_gain = Some(Estimate::new(own, deviation));
+        run.bias_dps = Some(Estimate::new(drift.to_degrees(), drift_deviation.to_degrees()));
+        run.rms_deg = Some(rms.to_degrees());
+        let gain = Gain::new(own, rms, fit.hypothesis.period_rad, of_input.range, track.track.mean_speed());
+        let agrees = gain.agrees(&Gain { value: k, within: 0.0 });
+        run.agrees = Some(agrees);
+        if !agrees {
+            warnings.push(format!("{}: its angular gain is {own:.5}, that of all runs {k:.5}", track.track.name));
+        }
+    }
+    for run in bench.screen.left_out_of(runs) {
+        run.agrees = Some(false);
+        run.r#use = "left out".into();
+    }
+    warnings
+}
