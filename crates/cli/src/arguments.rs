@@ -12,6 +12,9 @@ use crate::input;
 #[derive(Parser)]
 #[command(name = "cvg", version, about, after_help = EXAMPLES)]
 pub(crate) struct Arguments {
+    /// Memory that a recording may take while it is read, as in 512M or 4G; a quarter of the machine's where nothing is said
+    #[arg(long, global = true, value_name = "BYTES", value_parser = bytes)]
+    pub(crate) max_memory: Option<u64>,
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -55,6 +58,23 @@ Examples:
   cvg completions bash > ~/.local/share/bash-completion/completions/cvg
   cvg completions zsh > ~/.zfunc/_cvg
   cvg completions fish > ~/.config/fish/completions/cvg.fish";
+
+/// A number of bytes, with K, M or G for thousands, millions or billions of them.
+fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim().trim_end_matches(['B', 'b']);
+    let unit = match text.chars().last().map(|sign| sign.to_ascii_uppercase()) {
+        Some('K') => 1_000,
+        Some('M') => 1_000_000,
+        Some('G') => 1_000_000_000,
+        _ => 1,
+    };
+    let digits = if unit == 1 { text } else { &text[..text.len() - 1] };
+    let number: Option<u64> = digits.trim().parse().ok();
+    number
+        .and_then(|number| number.checked_mul(unit))
+        .filter(|bytes| *bytes > 0)
+        .ok_or_else(|| "wanted bytes, as in 512M or 4G".into())
+}
 
 /// What the columns of foreign files mean.
 #[derive(Args, Clone, Default)]

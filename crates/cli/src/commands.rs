@@ -1,6 +1,6 @@
 //! What each command does.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
@@ -22,7 +22,10 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     output::check_folder(out)?;
     let progress = Progress::begin();
     progress.say("simulating");
-    parsed.simulate().write(out).map_err(Failure::input)?;
+    let simulated = parsed.simulate();
+    let set = output::Set::begin(out, &[scenario.to_owned()])?;
+    simulated.write(set.folder()).map_err(Failure::input)?;
+    set.commit()?;
     drop(progress);
     output::tell(format_args!("wrote {}", out.join("campaign.toml").display()));
     Ok(())
@@ -48,20 +51,24 @@ pub(crate) fn identify(
     let progress = Progress::begin();
     progress.say("reading");
     let opened = open()?;
+    let inputs = input::sources(&opened);
+    out.map_or(Ok(()), |out| output::check_folder_for(out, &RESULTS, &inputs))?;
     let about = About::campaign(&opened);
     let identified = match identified(opened, &progress) {
         Ok(identified) => identified,
         Err(refusal) => {
             drop(progress);
             if refusal.cause == Cause::NoAnswer {
-                refuse(&about.refused(&refusal), out, json)?;
+                refuse(&about.refused(&refusal), out, &inputs, json)?;
             }
             return Err(refusal.into());
         }
     };
     drop(progress);
     if let Some(out) = out {
-        write_results(&identified, out)?;
+        let results = results(&identified)?;
+        let files: Vec<_> = RESULTS.into_iter().zip(results.iter().map(String::as_bytes)).collect();
+        output::write_all(out, &files, &inputs)?;
         output::tell(format_args!("wrote {}", out.join("report.html").display()));
     }
     if json {
@@ -74,13 +81,14 @@ pub(crate) fn identify(
 
 /// Says in report.json that there is no answer. What an earlier identification left beside it is not of this campaign, and
 /// goes.
-fn refuse(refused: &Refused, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+fn refuse(refused: &Refused, out: Option<&Path>, inputs: &[PathBuf], json: bool) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(refused).map_err(Failure::input)?;
     if let Some(out) = out {
-        output::write(&out.join("report.json"), text.as_bytes())?;
-        for stale in ["report.html", "calibration.toml"] {
-            output::remove(&out.join(stale))?;
-        }
+        let [report, stale @ ..] = RESULTS;
+        let mut set = output::Set::begin(out, inputs)?;
+        set.add(report, text.as_bytes())?;
+        set.take_away(&stale);
+        set.commit()?;
         output::tell(format_args!("wrote {}", out.join("report.json").display()));
     }
     if json { output::answer(&format!("{text}\n")) } else { Ok(()) }
@@ -98,13 +106,12 @@ fn identified(campaign: Campaign, progress: &Progress) -> Result<Identification,
     cvg_calibration::identify_with_picture(campaign, &options)
 }
 
-/// Writes report.json, report.html and calibration.toml: all of them, or none.
-pub(crate) fn write_results(identified: &Identification, out: &Path) -> Result<(), Failure> {
-    output::write_all(&[
-        (out.join("report.json"), report_json(identified)?.as_bytes()),
-        (out.join("report.html"), report::page(identified)?.as_bytes()),
-        (out.join("calibration.toml"), identified.calibration.to_text().as_bytes()),
-    ])
+/// Names of the results.
+pub(crate) const RESULTS: [&str; 3] = ["report.json", "report.html", "calibration.toml"];
+
+/// The texts of [`RESULTS`].
+pub(crate) fn results(identified: &Identification) -> Result<[String; 3], Failure> {
+    Ok([report_json(identified)?, report::page(identified)?, identified.calibration.to_text()])
 }
 
 /// report.json
@@ -114,6 +121,8 @@ pub(crate) fn report_json(identified: &Identification) -> Result<String, Failure
 
 /// `cvg compensate`
 pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, naming: &Naming) -> Result<(), Failure> {
+    let inputs = [calibration.to_owned(), recording.to_owned()];
+    output::check_file(out, &inputs)?;
     let calibration = Calibration::read(calibration)?;
     let recording = input::recording(recording, naming)?;
     recording.require_rotation()?;
@@ -128,7 +137,7 @@ pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, namin
         compensated.write_csv(&mut bytes)
     }
     .map_err(|e| Failure::input(format!("{}: {e}", out.display())))?;
-    output::write(out, &bytes)?;
+    output::write(out, &bytes, &inputs)?;
     output::tell(format_args!("wrote {}", out.display()));
     Ok(())
 }
@@ -146,10 +155,10 @@ pub(crate) fn manual(out: &Path) -> Result<(), Failure> {
     for (file, command) in pages {
         let mut page = Vec::new();
         clap_mangen::Man::new(command).render(&mut page).map_err(Failure::input)?;
-        written.push((out.join(file), page));
+        written.push((file, page));
     }
-    let files: Vec<_> = written.iter().map(|(path, page)| (path.clone(), page.as_slice())).collect();
-    output::write_all(&files)?;
+    let files: Vec<_> = written.iter().map(|(file, page)| (file.as_str(), page.as_slice())).collect();
+    output::write_all(out, &files, &[])?;
     output::tell(format_args!("wrote {} pages into {}", files.len(), out.display()));
     Ok(())
 }

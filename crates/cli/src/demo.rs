@@ -14,13 +14,17 @@ const README_POINTS: usize = 900;
 /// Runs the demonstration into `out`.
 pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
     output::check_folder(out)?;
-    let campaign = out.join("campaign");
-    output::tell(format_args!("simulating the paper's device into {}", campaign.display()));
+    output::tell(format_args!("simulating the paper's device into {}", out.join("campaign").display()));
+    let set = output::Set::begin(out, &[])?;
+    let campaign = set.folder().join("campaign");
     Scenario::paper().simulate().write(&campaign).map_err(Failure::input)?;
     output::tell(format_args!("identifying it from its recordings"));
     let identified = commands::run(|| Ok(Campaign::open(&campaign.join("campaign.toml"))?))?;
-    commands::write_results(&identified, out)?;
-    output::write(&out.join("bias.svg"), clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
+    for (name, text) in commands::RESULTS.into_iter().zip(commands::results(&identified)?) {
+        set.add(name, text.as_bytes())?;
+    }
+    set.add("bias.svg", clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
+    set.commit()?;
     if json {
         output::answer(&format!("{}\n", commands::report_json(&identified)?))?;
         return Ok(());

@@ -87,6 +87,12 @@ pub(crate) fn is_campaign(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
+/// The files that a campaign was read from.
+pub(crate) fn sources(campaign: &Campaign) -> Vec<PathBuf> {
+    let runs = campaign.runs.iter().map(|run| run.recording.source.clone());
+    std::iter::once(campaign.source.clone()).chain(runs).filter(|path| !path.as_os_str().is_empty()).collect()
+}
+
 /// Opens a campaign file, or makes a campaign of recordings.
 pub(crate) fn campaign(
     names: &[PathBuf],

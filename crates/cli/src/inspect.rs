@@ -23,9 +23,12 @@ pub(crate) fn inspect(
 ) -> Result<(), Failure> {
     let mut facts: Vec<Value> = Vec::new();
     let mut drawn = false;
-    for file in input::files(names)? {
-        let recordings = if input::is_campaign(&file) {
-            let campaign = Campaign::open_named(&file, naming).map_err(input::explained)?;
+    let files = input::files(names)?;
+    for file in &files {
+        let mut inputs = files.clone();
+        let recordings = if input::is_campaign(file) {
+            let campaign = Campaign::open_named(file, naming).map_err(input::explained)?;
+            inputs.extend(input::sources(&campaign));
             if !as_json {
                 output::answer(&format!("{}: {}, {} runs\n", file.display(), campaign.device, campaign.runs.len()))?;
                 for w in &campaign.warnings {
@@ -34,15 +37,15 @@ pub(crate) fn inspect(
             }
             campaign.runs.into_iter().map(|run| (Some(run.kind), run.recording)).collect()
         } else {
-            let read = input::read(&file, naming);
+            let read = input::read(file, naming);
             if let (false, Err(error)) = (as_json, &read) {
-                output::answer(&unnamed(&file, error))?;
+                output::answer(&unnamed(file, error))?;
             }
             vec![(None, read.map_err(input::explained)?)]
         };
         for (kind, recording) in recordings {
             if let Some(path) = plotted.filter(|_| !drawn) {
-                draw(&recording, path)?;
+                draw(&recording, path, &inputs)?;
                 drawn = true;
             }
             if as_json {
@@ -198,7 +201,7 @@ fn as_value(recording: &Recording) -> Value {
 }
 
 /// The columns over time, each in its own span, so that one figure holds them.
-fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
+fn draw(recording: &Recording, path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high > x.low).collect();
     let stride = recording.len().div_ceil(POINTS).max(1);
     let names: Vec<String> = shown.iter().map(|x| format!("{} ({:.4} to {:.4})", x.name, x.low, x.high)).collect();
@@ -215,9 +218,9 @@ fn draw(recording: &Recording, path: &Path) -> Result<(), Failure> {
         .collect();
     let (x, y) = ("time [s]", "share of each column's span");
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-        plot_png(path, x, y, &series)?;
+        output::write_with(path, inputs, |part| plot_png(part, x, y, &series))?;
     } else {
-        output::write(path, plot(x, y, &series)?.as_bytes())?;
+        output::write(path, plot(x, y, &series)?.as_bytes(), inputs)?;
     }
     output::tell(format_args!("wrote {}", path.display()));
     Ok(())

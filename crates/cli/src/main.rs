@@ -36,6 +36,8 @@ fn main() -> ExitCode {
         // help and version were asked for
         Err(error) => error.exit(),
     };
+    cvg_calibration::recording::limit_memory(arguments.max_memory.unwrap_or_default());
+    keep_to_the_machine();
     match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -43,6 +45,23 @@ fn main() -> ExitCode {
             ExitCode::from(failure.status)
         }
     }
+}
+
+/// Works with no more threads than the machine has processors, whatever the environment says, and does not repeat what a
+/// decoder says of a file that it panics at: the answer says it.
+fn keep_to_the_machine() {
+    let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok()).filter(|n| *n > 0);
+    // where the system gives no threads, the library says so when it wants the first
+    let _ = rayon::ThreadPoolBuilder::new()
+        .num_threads(asked.map_or(processors, |n: usize| n.min(processors)))
+        .build_global();
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !cvg_calibration::recording::panic_is_answer() {
+            usual(panic);
+        }
+    }));
 }
 
 fn run(command: Command) -> Result<(), Failure> {
@@ -74,7 +93,7 @@ fn run(command: Command) -> Result<(), Failure> {
 fn say(text: &str) {
     let plain = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty()) || !std::io::stderr().is_terminal();
     match text.strip_prefix("error:").filter(|_| !plain) {
-        Some(rest) => output::tell(format_args!("\u{1b}[1;31merror:\u{1b}[0m{rest}")),
+        Some(rest) => output::tell_in_red("error:", rest),
         None => output::tell(format_args!("{text}")),
     }
 }

@@ -4,7 +4,7 @@
 //! read again and identified by the paper's model alone, as the paper did it.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use cvg_calibration::recording::Campaign;
 use cvg_calibration::{Identification, Options, identify_with_picture};
@@ -43,8 +43,9 @@ struct Row {
 /// Writes figures, their data and the table into `out`.
 pub(crate) fn paper(out: &Path) -> Result<(), Failure> {
     output::check_folder(out)?;
-    let campaign = out.join("campaign");
-    output::tell(format_args!("simulating the paper's device into {}", campaign.display()));
+    output::tell(format_args!("simulating the paper's device into {}", out.join("campaign").display()));
+    let set = output::Set::begin(out, &[])?;
+    let campaign = set.folder().join("campaign");
     scenario()?.simulate().write(&campaign).map_err(Failure::input)?;
     output::tell(format_args!("identifying it with the paper's model"));
     let opened = Campaign::open(&campaign.join("campaign.toml"))?;
@@ -52,12 +53,13 @@ pub(crate) fn paper(out: &Path) -> Result<(), Failure> {
     let figures =
         [figure_2(), figure_3a(&identified), figure_3b(&identified), figure_4a(&identified), figure_4b(&identified)];
     for figure in &figures {
-        write(figure, out)?;
+        write(figure, &set)?;
     }
     let rows = rows(&identified);
-    output::write(&out.join("table.csv"), csv_table(&rows).as_bytes())?;
+    set.add("table.csv", csv_table(&rows).as_bytes())?;
     let table = markdown(&rows);
-    output::write(&out.join("table.md"), table.as_bytes())?;
+    set.add("table.md", table.as_bytes())?;
+    set.commit()?;
     output::answer(&table)?;
     output::tell(format_args!("wrote {}", out.display()));
     Ok(())
@@ -228,7 +230,7 @@ fn csv_table(rows: &[Row]) -> String {
     s
 }
 
-fn write(figure: &Figure, out: &Path) -> Result<(), Failure> {
+fn write(figure: &Figure, set: &output::Set) -> Result<(), Failure> {
     let mut data = format!("curve,{},{}\n", figure.columns[0], figure.columns[1]);
     for (name, points) in &figure.curves {
         for (x, y) in points {
@@ -243,12 +245,8 @@ fn write(figure: &Figure, out: &Path) -> Result<(), Failure> {
         .map(|((name, points), colour)| Series { name, colour, points: points.clone(), joined: figure.joined })
         .collect();
     let [x, y] = figure.axes;
-    let file = |ending: &str| -> PathBuf { out.join(format!("{}.{ending}", figure.name)) };
-    let svg = plot(x, y, &series)?;
-    output::write_all(&[(file("csv"), data.as_bytes()), (file("svg"), svg.as_bytes())])?;
-    // the bitmap is written under another name, and complete when it gets its own
-    let part = file("part.png");
-    plot_png(&part, x, y, &series)?;
-    std::fs::rename(&part, file("png"))
-        .map_err(|e| Failure::input(format!("{}: cannot be written: {e}", file("png").display())))
+    let file = |ending: &str| format!("{}.{ending}", figure.name);
+    set.add(&file("csv"), data.as_bytes())?;
+    set.add(&file("svg"), plot(x, y, &series)?.as_bytes())?;
+    plot_png(&set.folder().join(file("png")), x, y, &series)
 }

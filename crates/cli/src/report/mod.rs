@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use self::figures::Figure;
 use self::finding::{finding, times};
-use crate::{Failure, clouds, commands};
+use crate::{Failure, clouds, commands, output};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -60,11 +60,11 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     );
     let data: Vec<Value> = figures.iter().map(Figure::data).collect();
     let data = serde_json::to_string(&data).map_err(Failure::input)?;
-    // no text within a script may end it
+    // no text within a script may end it, or begin another
     let _ = writeln!(
         h,
         "<script type=\"application/json\" id=\"figures\">{}</script>{}<script>{SCRIPT}</script></body></html>",
-        data.replace("</", "<\\/"),
+        data.replace('<', "\\u003c"),
         plotly_script()
     );
     Ok(h)
@@ -157,7 +157,7 @@ fn draw(h: &mut String, identified: &Identification, figures: &[Figure]) -> Resu
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    output::plain(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
