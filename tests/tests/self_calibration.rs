@@ -94,6 +94,7 @@ proptest! {
     }
 
     //= specs/self-calibration.md#positive
+    //= type=test
     //# The covariance MUST stay positive through every measurement and every step of its growth.
     #[test]
     fn prop_the_covariance_stays_positive_in_single_precision(
@@ -116,6 +117,7 @@ proptest! {
     }
 
     //= specs/self-calibration.md#undone
+    //= type=test
     //# A correction MUST undo a readout of its own ratio, skew, phase and offsets.
     #[test]
     fn prop_a_correction_undoes_a_readout_of_its_own_values(
@@ -151,6 +153,7 @@ proptest! {
     }
 
     //= specs/self-calibration.md#bounded
+    //= type=test
     //# Every value in force MUST be finite and one that a device can have for every input.
     #[test]
     fn prop_any_bits_leave_the_compensation_that_of_a_device(
@@ -187,6 +190,7 @@ fn steady(i: usize) -> (Pendulum<f32>, (f32, f32), Commands<f32>) {
 }
 
 //= specs/self-calibration.md#held
+//= type=test
 //# Nothing MUST be learned from a disturbed instrument.
 #[test]
 fn a_disturbed_instrument_teaches_nothing_and_is_not_turned() {
@@ -212,6 +216,7 @@ fn a_disturbed_instrument_teaches_nothing_and_is_not_turned() {
 }
 
 //= specs/self-calibration.md#excitation
+//= type=test
 //# What was not excited MUST NOT be moved.
 #[test]
 fn a_device_that_never_rests_keeps_the_scale_of_its_forces() {
@@ -231,6 +236,7 @@ fn calibrated<T: Float>(state: &State<T>, device: &Device) -> f64 {
 }
 
 //= specs/self-calibration.md#not-guessed
+//= type=test
 //# A detection that nothing has told MUST be said to be unknown.
 #[test]
 fn a_device_at_rest_says_that_it_does_not_know_its_detection() {
@@ -251,6 +257,7 @@ fn a_device_at_rest_says_that_it_does_not_know_its_detection() {
 }
 
 //= specs/self-calibration.md#taken-back
+//= type=test
 //# A commit that predicts what follows worse than the values before it MUST be taken back.
 #[test]
 fn a_commit_of_what_was_only_passing_is_taken_back() {
@@ -282,6 +289,7 @@ fn state_taken_back<T: Float>(run: &Loop<'_, T>) -> u16 {
 }
 
 //= specs/self-calibration.md#restored
+//= type=test
 //# A record MUST be restored to what was saved or refused.
 #[test]
 fn a_record_is_restored_as_it_was_or_refused() {
