@@ -11,7 +11,7 @@ use crate::diagnostics::residual::{
 };
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
-use crate::estimation::fit::{Fit, Window, block_covariance};
+use crate::estimation::fit::{Fit, Window};
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
@@ -28,6 +28,7 @@ use crate::report::{
     Tool,
 };
 use crate::selection::discovery::{Step, discover};
+use crate::selection::last_step::last_step;
 
 /// How an identification is run.
 pub struct Options<'a> {
@@ -119,8 +120,10 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let paper = declared_hypothesis(&bench.start);
     let declared = fit_with_ring_downs(&mut bench, &paper)?;
     let declared_fit = declared.fit.clone();
-    let (fitted, steps) =
+    let (mut fitted, mut steps) =
         if options.discover { discover(&mut bench, declared, options.progress)? } else { (declared, Vec::new()) };
+    (options.progress)("weighing by what the noise remembers");
+    let covariance = last_step(&mut bench, &mut fitted, &mut steps)?;
     (options.progress)("measuring the held-out error");
     let heldout = |h: &Hypothesis, fit: &Fit, like: Option<&Evaluation>| {
         evaluate(&bench.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
@@ -136,7 +139,6 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
     let count = on_fit.errors().count();
     let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
-    let covariance = covariance(&bench, &fitted.fit);
 
     let declared_on_fit =
         evaluate(&bench.tracks, &declared_fit.hypothesis, &declared_fit.starts, Role::Fit, Window::Whole, None);
@@ -170,12 +172,15 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         };
         scene.picture()
     });
-    let spikes = fitted.fit.set_aside + after.spikes();
-    if spikes > 0 {
-        warnings.push(format!("{spikes} samples were set aside as spikes"));
+    let spikes: Vec<usize> =
+        fitted.fit.set_aside.iter().enumerate().map(|(track, fit)| fit + after.spikes_of(track)).collect();
+    let all_spikes: usize = spikes.iter().sum();
+    if all_spikes > 0 {
+        warnings.push(format!("{all_spikes} samples were set aside as spikes"));
     }
     warnings.extend(tell_apart(&mut runs, &bench, &fitted.fit, (&on_fit, &after)));
-    for (run, t) in bench.screen.of(&mut runs).into_iter().zip(&bench.tracks) {
+    for ((run, t), spikes) in bench.screen.of(&mut runs).into_iter().zip(&bench.tracks).zip(spikes) {
+        run.spikes = spikes;
         run.rate_dps = Some(t.track.mean_rate().to_degrees());
         run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
             (true, true) => "fit, last quarter held out".into(),
@@ -259,35 +264,6 @@ fn no_better(heldout: &Heldout, samples: usize) -> Option<String> {
              leaves the angle as it is"
         )
     })
-}
-
-/// Covariance of the unknowns: the larger of that of white residuals and of the block covariance, which allows for their
-/// memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
-fn covariance(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
-    let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
-    let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
-    // what considered unknowns could be does not depend on what is left
-    let plain = &fit.by_noise * (scale * undescribed(bench, fit) - 1.0) + &fit.covariance;
-    let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
-    let n = fit.unknowns.len();
-    // raise each deviation to the larger of the two and keep the correlations
-    let raise: Vec<f64> =
-        (0..n).map(|i| (blocks[(i, i)] / plain[(i, i)].max(f64::MIN_POSITIVE)).max(1.0).sqrt()).collect();
-    DMatrix::from_fn(n, n, |i, j| plain[(i, j)] * raise[i] * raise[j])
-}
-
-/// By what factor the mean square would be larger without empirical corrections, where the model is known to lack what
-/// the loops do; 1 elsewhere.
-fn undescribed(bench: &Bench, fit: &Fit) -> f64 {
-    let mut explained = fit.hypothesis.clone();
-    explained.members.retain(|m| m.origin != Origin::Empirical);
-    if explained == fit.hypothesis || !bench.tracks.iter().any(|t| t.drifts) {
-        return 1.0;
-    }
-    let mean_square = |hypothesis: &Hypothesis| {
-        evaluate(&bench.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
-    };
-    (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
 }
 
 pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {

@@ -127,9 +127,10 @@ impl Evaluation {
             .flat_map(|(s, k)| s.angle.iter().zip(k).filter(|(_, k)| **k).map(|(a, _)| *a))
     }
 
-    /// Samples set aside as spikes.
-    pub(crate) fn spikes(&self) -> usize {
-        self.kept.iter().flatten().filter(|k| !**k).count()
+    /// Samples of a track that are set aside as spikes.
+    pub(crate) fn spikes_of(&self, track: usize) -> usize {
+        let of_track = self.segments.iter().zip(&self.kept).filter(|(s, _)| s.track == track);
+        of_track.flat_map(|(_, kept)| kept).filter(|k| !**k).count()
     }
 
     /// Mean square of the kept errors, rad².

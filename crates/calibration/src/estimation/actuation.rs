@@ -140,7 +140,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         tau_s: 1.0 / rate,
         tau_error_s: rate_error / (rate * rate),
         drive,
-        drive_error: mean_error(&on.2, mean),
+        drive_error: STUDENT_11 * mean_error(&on.2, mean),
         decay,
     })
 }
@@ -174,6 +174,10 @@ fn retain(values: &mut Vec<f64>, keep: &[bool]) {
     let mut kept = keep.iter();
     values.retain(|_| kept.next().copied().unwrap_or(true));
 }
+
+/// How much further than a normal quantile Student's of 11 degrees of freedom lies at 95 %: what twelve blocks tell of
+/// their own deviation.
+const STUDENT_11: f64 = 2.201 / 1.960;
 
 /// Standard error of a mean from means of blocks: neighbouring samples of a loop's output are not independent.
 fn mean_error(values: &[f64], mean: f64) -> f64 {

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::data::track::{Segment, Track};
+use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::propagation::{Pace, Start, walk};
 use crate::estimation::statistics::circular_mean;
 use crate::estimation::sums::{Own, Sums};
@@ -72,8 +73,8 @@ pub(crate) struct Fit {
     pub(crate) step_gain: f64,
     /// residuals counted in each
     pub(crate) counted: [usize; 2],
-    /// samples set aside as spikes
-    pub(crate) set_aside: usize,
+    /// samples of each track that are set aside as spikes
+    pub(crate) set_aside: Vec<usize>,
 }
 
 impl Fit {
@@ -103,8 +104,6 @@ impl Effort {
 const LARGEST_SET_ASIDE: f64 = 0.2;
 /// Limits of spikes are not widened beyond this factor.
 const WIDEST: f64 = 1e6;
-/// How fast unrecorded commands precess a pattern, rad/s: tan(θ_error)/τ for an angle wrong by 10 mrad and τ = 10 s.
-const DRIFT_RAD_S: f64 = 1e-3;
 /// A step is the last when after it no unknown is wrong by more than this share of its standard deviation.
 const CONVERGED: f64 = 0.02;
 /// A step that moves the angle by δ rad misses by less than this times δ, as a share of itself.
@@ -131,7 +130,7 @@ pub(crate) fn fit(
         prior_chi2: 0.0,
         step_gain: 0.0,
         counted: [0; 2],
-        set_aside: 0,
+        set_aside: vec![0; tracks.len()],
     };
     let considered: Vec<Option<f64>> =
         unknowns.iter().map(|u| priors.iter().find(|p| p.considered && p.unknown == *u).map(|p| p.deviation)).collect();
@@ -149,7 +148,8 @@ pub(crate) fn fit(
             .map(|(p, starts)| collect(p, starts, &result.hypothesis, &sorted, role, (stride(p), widened)))
             .collect();
         let here = Linearised::new(&result, sums, priors, n);
-        let far_off = here.set_aside as f64 > LARGEST_SET_ASIDE * (here.set_aside + here.counted[0]) as f64;
+        let set_aside: usize = here.set_aside.iter().sum();
+        let far_off = set_aside as f64 > LARGEST_SET_ASIDE * (set_aside + here.counted[0]) as f64;
         if far_off && best.is_none() && widened < WIDEST {
             // Not spikes but a hypothesis that does not fit yet: look at more of the data.
             widened *= 4.0;
@@ -227,19 +227,19 @@ struct Linearised {
     chi2: [f64; 2],
     prior_chi2: f64,
     counted: [usize; 2],
-    set_aside: usize,
+    set_aside: Vec<usize>,
 }
 
 impl Linearised {
     fn new(at: &Fit, sums: Vec<Vec<Sums>>, priors: &[Prior], n: usize) -> Self {
         let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        let (mut chi2, mut prior_chi2, mut counted, mut set_aside) = ([0.0; 2], 0.0, [0; 2], 0);
+        let (mut chi2, mut prior_chi2, mut counted) = ([0.0; 2], 0.0, [0; 2]);
+        let set_aside = sums.iter().map(|track| track.iter().map(|s| s.set_aside).sum()).collect();
         for s in sums.iter().flatten() {
             chi2[0] += s.eliminate(&s.angle, &mut normal, &mut right);
             chi2[1] += s.eliminate(&s.amplitude, &mut normal, &mut right);
             counted[0] += s.counted[0];
             counted[1] += s.counted[1];
-            set_aside += s.set_aside;
         }
         for p in priors {
             if let Some(i) = at.unknowns.iter().position(|u| *u == p.unknown) {
@@ -267,7 +267,7 @@ impl Linearised {
     /// Moves `result` from here by `step`, biases and all.
     fn apply(&self, step: &DVector<f64>, result: &mut Fit) {
         (result.chi2, result.prior_chi2) = (self.chi2, self.prior_chi2);
-        (result.counted, result.set_aside) = (self.counted, self.set_aside);
+        (result.counted, result.set_aside) = (self.counted, self.set_aside.clone());
         result.step_gain = self.right.dot(step);
         for (i, u) in result.unknowns.iter().enumerate() {
             let value = self.hypothesis.get(*u) + step[i];
@@ -286,7 +286,7 @@ impl Linearised {
 
 /// Largest turn of the pattern between samples of a thinned track, rad: what a command that repeats with it does to the
 /// pattern stays good to 1e-5 of it.
-const LARGEST_TURN: f64 = 0.2;
+pub(crate) const LARGEST_TURN: f64 = 0.2;
 
 /// By how much a track is thinned where `enough` of `samples` will do, as far as the pattern turns little between them.
 fn thinning(track: &Track, hypothesis: &Hypothesis, samples: usize, enough: usize) -> usize {
@@ -352,15 +352,20 @@ fn own(prepared: &Prepared, segment: &Segment, hypothesis: &Hypothesis, unknowns
 }
 
 /// A step of the unknowns and its covariance: all of it, and the part that the residuals' noise makes.
-struct Solution {
-    step: DVector<f64>,
-    by_noise: DMatrix<f64>,
-    covariance: DMatrix<f64>,
+pub(crate) struct Solution {
+    pub(crate) step: DVector<f64>,
+    pub(crate) by_noise: DMatrix<f64>,
+    pub(crate) covariance: DMatrix<f64>,
 }
 
 /// Solves a fit's normal equations after scaling them to a unit diagonal and adding `damping` to that. Considered
 /// unknowns, those with a deviation, do not move; what they could be shows in the covariance.
-fn solve(normal: &DMatrix<f64>, right: &DVector<f64>, damping: f64, considered: &[Option<f64>]) -> Option<Solution> {
+pub(crate) fn solve(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    damping: f64,
+    considered: &[Option<f64>],
+) -> Option<Solution> {
     let n = right.len();
     let free: Vec<usize> = (0..n).filter(|&i| considered[i].is_none()).collect();
     let held: Vec<(usize, f64)> = (0..n).filter_map(|i| considered[i].map(|d| (i, d))).collect();

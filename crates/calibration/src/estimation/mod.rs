@@ -3,12 +3,17 @@
 pub mod actuation;
 pub(crate) mod amplitude_equation;
 pub mod bias;
+pub(crate) mod coloured_noise;
 pub(crate) mod fit;
+pub(crate) mod generalised_least_squares;
 pub mod identifiability;
 pub(crate) mod initial_guess;
 pub(crate) mod joint_fit;
 pub(crate) mod linear;
+pub(crate) mod normal;
 pub(crate) mod propagation;
+pub(crate) mod restricted_likelihood;
 pub(crate) mod screening;
+pub(crate) mod simplex;
 pub(crate) mod statistics;
 pub(crate) mod sums;

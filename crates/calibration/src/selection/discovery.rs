@@ -76,6 +76,8 @@ pub struct Step {
     pub energy_balance: Option<[f64; 2]>,
     /// why a cause of the library is not claimed
     pub doubt: Option<String>,
+    /// the energy balance contradicts it, or a cause that explains the angle as well
+    pub contradicted: bool,
 }
 
 /// One step from the fitted hypothesis: what it promises ranks the candidates.
@@ -112,6 +114,13 @@ pub(crate) fn discover(
     Ok((fitted, steps))
 }
 
+/// Which step brought a member in: members that are the same effect stand in the order of their steps.
+pub(crate) fn step_of(hypothesis: &Hypothesis, at: usize, steps: &[Step]) -> Option<usize> {
+    let id = hypothesis.members[at].id;
+    let earlier = hypothesis.members[..at].iter().filter(|m| m.id == id).count();
+    steps.iter().enumerate().filter(|(_, s)| s.id == id).nth(earlier).map(|(i, _)| i)
+}
+
 /// Asks every run for what was claimed: a cause that a run contradicts becomes an empirical description.
 fn question(bench: &Bench, fit: &mut Fit, steps: &mut [Step]) {
     for at in 0..fit.hypothesis.members.len() {
@@ -119,8 +128,7 @@ fn question(bench: &Bench, fit: &mut Fit, steps: &mut [Step]) {
         if member.origin != Origin::Discovered {
             continue;
         }
-        let earlier = fit.hypothesis.members[..at].iter().filter(|m| m.id == member.id).count();
-        let Some(step) = steps.iter_mut().filter(|s| s.id == member.id).nth(earlier) else { continue };
+        let Some(step) = step_of(&fit.hypothesis, at, steps).map(|i| &mut steps[i]) else { continue };
         if let Some(doubt) = doubt(bench, fit, at) {
             fit.hypothesis.members[at].origin = Origin::Empirical;
             step.origin = Origin::Empirical;
@@ -170,6 +178,7 @@ fn centre(bench: &mut Bench, plain: &Fitted, ellipse: &Ellipse) -> Result<(Fitte
                 confounded_with: Vec::new(),
                 energy_balance: None,
                 doubt: None,
+                contradicted: false,
             });
         }
     }
@@ -252,6 +261,7 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
             confounded_with,
             energy_balance: balance_before.zip(chosen.balance).map(|(a, b)| [a.sqrt(), b.sqrt()]),
             doubt: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
+            contradicted: chosen.refuted || trials.iter().any(|t| t.refuted && t.gain > chosen.gain - LEAST_LEAD),
         };
         return Ok(Some((next, step)));
     }
@@ -358,8 +368,9 @@ fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> R
             .min_by(|a, b| a.0.total_cmp(&b.0));
         match weakest {
             Some((gain, i)) if gain < LEAST_GAIN => {
+                let step = step_of(&fitted.fit.hypothesis, i, steps);
                 let mut reduced = fitted.fit.hypothesis.clone();
-                let member = reduced.members.remove(i);
+                reduced.members.remove(i);
                 let before = heldout(bench, &fitted.fit);
                 let without = fit_with_ring_downs(bench, &reduced)?;
                 if (1.0 - LEAST_HELDOUT_GAIN) * heldout(bench, &without.fit) > before {
@@ -368,7 +379,9 @@ fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> R
                     return Ok(());
                 }
                 *fitted = without;
-                steps.retain(|s| s.id != member.id);
+                if let Some(step) = step {
+                    steps.remove(step);
+                }
             }
             _ => return Ok(()),
         }
@@ -412,7 +425,7 @@ fn count(fit: &Fit) -> f64 {
 
 /// Mean square after the last step; infinite where most of the data had to be set aside.
 fn mean_square(fit: &Fit) -> f64 {
-    if fit.counted[0] <= fit.set_aside {
+    if fit.counted[0] <= fit.set_aside.iter().sum() {
         return f64::INFINITY;
     }
     fit.left() / count(fit).max(1.0)

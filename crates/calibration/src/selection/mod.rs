@@ -3,3 +3,4 @@
 pub(crate) mod candidates;
 pub(crate) mod consistency;
 pub mod discovery;
+pub(crate) mod last_step;

@@ -1,0 +1,181 @@
+//! What an identification ends with: the last step of the fit, what it still finds significant, and the covariance of
+//! all that was fitted.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnostics::evaluate::evaluate;
+use crate::error::Refusal;
+use crate::estimation::fit::{Fit, Window, block_covariance, scaled_inverse};
+use crate::estimation::generalised_least_squares::{Refined, refine};
+use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+use crate::recording::{Instrument, Role};
+use crate::selection::discovery::{LEAST_GAIN, Step, step_of};
+use cvg_model::effects::Role as ParameterRole;
+
+/// A last step that leaves more than this many times the mean square of held-back data is not made: it is linear, and
+/// what it moves was not.
+const WORSE: f64 = 1.1;
+
+/// Ends a fit: effects that its noise can make are dropped, the last step is made, and the covariance of the unknowns is
+/// what it leaves.
+///
+/// # Errors
+/// As for the fit.
+pub(crate) fn last_step(
+    bench: &mut Bench,
+    fitted: &mut Fitted,
+    steps: &mut Vec<Step>,
+) -> Result<DMatrix<f64>, Refusal> {
+    if bench.instrument == Instrument::Sensor {
+        // the amplitude is part of a sensor's fit
+        return Ok(of_blocks(bench, &fitted.fit));
+    }
+    loop {
+        let Some(refined) = refined(bench, fitted) else {
+            return Ok(of_blocks(bench, &fitted.fit));
+        };
+        let Some((member, step)) = insignificant(&refined, steps) else {
+            let covariance = settled(bench, fitted, refined);
+            return Ok(doubted(&fitted.fit, steps, covariance));
+        };
+        let mut reduced = fitted.fit.hypothesis.clone();
+        reduced.members.remove(member);
+        steps.remove(step);
+        *fitted = fit_with_ring_downs(bench, &reduced)?;
+    }
+}
+
+/// The last step, with what the commands do adjusted where the runs tell it. White weights hold the drive where much is
+/// left, lest that drag it along; where it is only noise, and the runs agree, there is nothing to drag.
+fn refined(bench: &mut Bench, fitted: &Fitted) -> Option<Refined> {
+    let held = bench.drive_is_free;
+    let step = |bench: &Bench| {
+        let unknowns = bench.unknowns(&fitted.fit.hypothesis);
+        let priors = bench.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
+        refine(&bench.tracks, &Fit { unknowns, ..fitted.fit.clone() }, &priors)
+    };
+    if !held && bench.tracks_differ() {
+        bench.drive_is_free = true;
+        if let Some(freed) = step(bench).filter(|r| r.disagreement == 1.0) {
+            return Some(freed);
+        }
+    }
+    bench.drive_is_free = held;
+    step(bench)
+}
+
+/// The least significant member that discovery added, and its step, where coloured noise and the runs' disagreement
+/// explain it as well: where its gain in 2 ln likelihood, after the price of its parameters, is less than discovery asks for.
+fn insignificant(refined: &Refined, steps: &[Step]) -> Option<(usize, usize)> {
+    let hypothesis = &refined.fit.hypothesis;
+    (0..hypothesis.members.len())
+        .filter_map(|at| Some((significance(refined, at)?, at, step_of(hypothesis, at, steps)?)))
+        .filter(|(gain, ..)| *gain < LEAST_GAIN)
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, at, step)| (at, step))
+}
+
+/// What a member gains in 2 ln likelihood over its absence (Wald 1943), less ln n for each of its parameters; `None`
+/// where none of them is fitted.
+fn significance(refined: &Refined, at: usize) -> Option<f64> {
+    let member = &refined.fit.hypothesis.members[at];
+    let parameters = member.id.description().parameters;
+    let own: Vec<(usize, f64)> = refined
+        .fit
+        .unknowns
+        .iter()
+        .enumerate()
+        .filter_map(|(i, u)| match u {
+            // where a line lies says nothing of how large it is
+            Unknown::Effect(m, p) if *m == at && !matches!(parameters[*p].role, ParameterRole::Located(_)) => {
+                Some((i, member.values[*p] - member.id.neutral::<f64>()[*p]))
+            }
+            _ => None,
+        })
+        .collect();
+    if own.is_empty() {
+        return None;
+    }
+    let block = DMatrix::from_fn(own.len(), own.len(), |i, j| refined.covariance[(own[i].0, own[j].0)]);
+    let value = DVector::from_iterator(own.len(), own.iter().map(|(_, v)| *v));
+    let n = (refined.fit.counted[0] as f64).max(2.0);
+    Some(value.dot(&(scaled_inverse(&block, 0.0)? * &value)) - own.len() as f64 * n.ln())
+}
+
+/// Makes the last step, unless held-back data speak against it: then the estimate stays, and by how much it would have
+/// moved counts as its error (Hausman 1978).
+fn settled(bench: &Bench, fitted: &mut Fitted, refined: Refined) -> DMatrix<f64> {
+    let left = |fit: &Fit| {
+        evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None).mean_square()
+    };
+    let Refined { fit, mut covariance, .. } = refined;
+    if left(&fit) <= WORSE * left(&fitted.fit) {
+        fitted.fit = fit;
+        return covariance;
+    }
+    let moved = DVector::from_iterator(
+        fit.unknowns.len(),
+        fit.unknowns.iter().map(|u| fit.hypothesis.get(*u) - fitted.fit.hypothesis.get(*u)),
+    );
+    covariance.ger(1.0, &moved, &moved, 1.0);
+    let (hypothesis, starts) = (fitted.fit.hypothesis.clone(), fitted.fit.starts.clone());
+    fitted.fit = Fit { hypothesis, starts, ..fit };
+    covariance
+}
+
+/// A correction without a cause that the energy balance contradicts stands for something else: what the other unknowns
+/// would move by without it counts as their error.
+fn doubted(fit: &Fit, steps: &[Step], mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let n = fit.unknowns.len();
+    let before = covariance.clone();
+    for (at, member) in fit.hypothesis.members.iter().enumerate().filter(|(_, m)| m.origin == Origin::Empirical) {
+        let contradicted = step_of(&fit.hypothesis, at, steps).is_some_and(|step| steps[step].contradicted);
+        let own: Vec<usize> = (0..n).filter(|&i| matches!(fit.unknowns[i], Unknown::Effect(m, _) if m == at)).collect();
+        if !contradicted || own.is_empty() {
+            continue;
+        }
+        let Some(inverse) = scaled_inverse(&before.select_rows(&own).select_columns(&own), 0.0) else { continue };
+        let away = DVector::from_iterator(
+            own.len(),
+            own.iter().map(|&i| match fit.unknowns[i] {
+                Unknown::Effect(_, p) => member.values[p] - member.id.neutral::<f64>()[p],
+                _ => 0.0,
+            }),
+        );
+        let moved = before.select_columns(&own) * inverse * away;
+        for i in (0..n).filter(|i| !own.contains(i)) {
+            covariance[(i, i)] += moved[i] * moved[i];
+        }
+    }
+    covariance
+}
+
+/// Covariance without a last step: the larger of that of white residuals and of the block covariance, which allows for
+/// their memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
+fn of_blocks(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
+    let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
+    let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
+    // what considered unknowns could be does not depend on what is left
+    let plain = &fit.by_noise * (scale * undescribed(bench, fit) - 1.0) + &fit.covariance;
+    let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
+    let n = fit.unknowns.len();
+    // raise each deviation to the larger of the two and keep the correlations
+    let raise: Vec<f64> =
+        (0..n).map(|i| (blocks[(i, i)] / plain[(i, i)].max(f64::MIN_POSITIVE)).max(1.0).sqrt()).collect();
+    DMatrix::from_fn(n, n, |i, j| plain[(i, j)] * raise[i] * raise[j])
+}
+
+/// By what factor the mean square would be larger without empirical corrections, where the model is known to lack what
+/// the loops do; 1 elsewhere.
+fn undescribed(bench: &Bench, fit: &Fit) -> f64 {
+    let mut explained: Hypothesis = fit.hypothesis.clone();
+    explained.members.retain(|m| m.origin != Origin::Empirical);
+    if explained == fit.hypothesis || !bench.tracks.iter().any(|t| t.drifts) {
+        return 1.0;
+    }
+    let mean_square = |hypothesis: &Hypothesis| {
+        evaluate(&bench.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
+    };
+    (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
+}
