@@ -11,7 +11,7 @@ use cvg_calibration::report::Estimate;
 use cvg_calibration::{Identification, Options, Origin, Refusal};
 use cvg_model::effects::{EffectId, Values};
 use cvg_simulator::noise::Noise;
-use cvg_simulator::scenario::EffectSetting;
+use cvg_simulator::scenario::{EffectSetting, Run};
 use cvg_simulator::{Scenario, Settings};
 
 /// How many trials a random test makes: `CVG_TRIALS`, or `default`.
@@ -112,6 +112,39 @@ pub fn plain_paper() -> Settings {
     settings
 }
 
+/// Noise that remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coloured {
+    /// forces that walk the angle: 0.13 to 1.3 deg/√h, as √(force noise²/control rate)
+    Walk,
+    /// readout gains with 1/f noise: 0.02 to 0.2 permille
+    Gains,
+    /// a table whose rate has 1/f noise: 0.01 to 0.1 permille
+    Table,
+    /// each of them
+    All,
+}
+
+impl Coloured {
+    /// All kinds in turn.
+    pub fn of(number: u64) -> Self {
+        [Self::Walk, Self::Gains, Self::Table, Self::All][(number % 4) as usize]
+    }
+
+    /// Adds noise of this kind.
+    pub fn add(self, settings: &mut Settings, draw: &mut Draws) {
+        if matches!(self, Self::Walk | Self::All) {
+            settings.force_noise_v = draw.scale(1.7e-3, 1.7e-2);
+        }
+        if matches!(self, Self::Gains | Self::All) {
+            settings.gain_flicker = draw.scale(2e-5, 2e-4);
+        }
+        if matches!(self, Self::Table | Self::All) {
+            settings.table_wander = draw.scale(1e-5, 1e-4);
+        }
+    }
+}
+
 /// The scenario of these settings.
 ///
 /// # Panics
@@ -128,8 +161,26 @@ pub fn scenario(settings: Settings) -> Scenario {
 /// # Panics
 /// Where the folder cannot be written or read again.
 pub fn identify(settings: Settings) -> Result<Identification, Refusal> {
+    identify_without(settings, &[])
+}
+
+/// [`identify`], of recordings that lack columns; without the commands there are no ring-downs either.
+///
+/// # Errors
+/// Where the identification refuses the campaign.
+///
+/// # Panics
+/// Where the folder cannot be written or read again.
+pub fn identify_without(mut settings: Settings, columns: &[&str]) -> Result<Identification, Refusal> {
+    if columns.contains(&"vas_v") {
+        settings.runs.retain(|r| matches!(r, Run::Rotation { .. }));
+    }
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
-    scenario(settings).simulate().write(folder.path()).unwrap_or_else(|e| panic!("{e}"));
+    let mut simulated = scenario(settings).simulate();
+    for run in &mut simulated.runs {
+        run.columns.retain(|c| !columns.contains(&c.name));
+    }
+    simulated.write(folder.path()).unwrap_or_else(|e| panic!("{e}"));
     std::fs::remove_file(folder.path().join("truth.toml")).unwrap_or_else(|e| panic!("{e}"));
     identify_folder(folder.path())
 }
