@@ -26,6 +26,8 @@ const LEVEL: f64 = 1e-3;
 /// Half width of the angular gain's interval where a drift of 1e-3 rad/s may go unrecorded in each of several runs, the
 /// fastest at 500 deg/s: 1.96 · 1e-3 / 8.7, with room for the slower ones.
 const WIDEST_ANGULAR_GAIN: f64 = 5e-4;
+/// One campaign in so many may give no answer.
+const MOST_UNANSWERED: u64 = 10;
 /// Errors that are printed one by one, in standard deviations.
 const FAR: f64 = 3.0;
 
@@ -121,10 +123,12 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
             held as f64 / n,
             widths[widths.len() / 2]
         );
-        let lowest = binomial_quantile(count, LOWEST_COVERAGE, LEVEL);
-        let highest = if highest < 1.0 { binomial_quantile(count, highest, 1.0 - LEVEL) } else { count };
-        if told.len() as u64 != count {
-            failures.push(format!("{name}: {} of {count} campaigns gave no answer", count - told.len() as u64));
+        let lowest = binomial_quantile(told.len() as u64, LOWEST_COVERAGE, LEVEL);
+        let highest = if highest < 1.0 { binomial_quantile(told.len() as u64, highest, 1.0 - LEVEL) } else { count };
+        // under strong noise an interval may be too wide to be an answer, now and then
+        let unanswered = count - told.len() as u64;
+        if unanswered * MOST_UNANSWERED > count {
+            failures.push(format!("{name}: {} of {count} campaigns gave no answer", unanswered));
         }
         if !(lowest..=highest).contains(&held) {
             failures

@@ -116,7 +116,8 @@ pub(crate) fn report(
     }
     let mut warnings = head.warnings.clone();
     warnings.extend(finding.warnings.iter().cloned());
-    let spikes = on_fit.spikes() + after.spikes();
+    let numbers: std::collections::BTreeSet<usize> = fitted.iter().chain(held).map(|r| r.number).collect();
+    let spikes: usize = numbers.iter().map(|&n| on_fit.spikes_of(n) + after.spikes_of(n)).sum();
     if spikes > 0 {
         warnings.push(format!("{spikes} samples were set aside as spikes"));
     }
