@@ -171,7 +171,7 @@ pub struct Loop<'a, T> {
 impl<'a, T: Float> Loop<'a, T> {
     /// A vibration at its set amplitude, nothing learned.
     pub fn new(device: &'a Device, seed: u64, settings: &Settings) -> Self {
-        let calibrator = Calibrator::new(settings).unwrap();
+        let calibrator = Calibrator::new(settings).expect("settings of a calibrator");
         let state = calibrator.start();
         let theta = 0.3_f64;
         Self {
@@ -307,13 +307,14 @@ fn harmonics_rms(series: &[(f64, f64, f64)]) -> f64 {
             }
         }
         for i in 0..m {
-            let p = (i..m).max_by(|x, y| a[*x][i].abs().total_cmp(&a[*y][i].abs())).unwrap();
+            let p = (i..m).max_by(|x, y| a[*x][i].abs().total_cmp(&a[*y][i].abs())).expect("a row is left");
             a.swap(i, p);
-            for r in 0..m {
+            let pivot = a[i].clone();
+            for (r, row) in a.iter_mut().enumerate() {
                 if r != i {
-                    let f = a[r][i] / a[i][i];
-                    for c in i..=m {
-                        a[r][c] -= f * a[i][c];
+                    let f = row[i] / pivot[i];
+                    for (to, from) in row.iter_mut().zip(&pivot).skip(i) {
+                        *to -= f * from;
                     }
                 }
             }
@@ -439,7 +440,7 @@ pub fn all<R: Send>(count: u64, trial: impl Fn(u64) -> R + Sync) -> Vec<R> {
             }
         };
         let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        handles.into_iter().flat_map(|h| h.join().unwrap()).collect()
+        handles.into_iter().flat_map(|h| h.join().expect("a trial that ends")).collect()
     });
     done.sort_by_key(|(number, _)| *number);
     done.into_iter().map(|(_, result)| result).collect()

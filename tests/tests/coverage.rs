@@ -128,7 +128,7 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
         // under strong noise an interval may be too wide to be an answer, now and then
         let unanswered = count - told.len() as u64;
         if unanswered * MOST_UNANSWERED > count {
-            failures.push(format!("{name}: {} of {count} campaigns gave no answer", unanswered));
+            failures.push(format!("{name}: {unanswered} of {count} campaigns gave no answer"));
         }
         if !(lowest..=highest).contains(&held) {
             failures
