@@ -127,9 +127,10 @@ impl<T: Float> Precession<T> {
         steady
     }
 
+    /// [`Precession::step`] where [`Precession::step_steadily`] was false.
     #[cold]
     #[inline(never)]
-    fn step_otherwise(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {
+    pub fn step_otherwise(&self, state: &mut PrecessionState<T>, p: &Pendulum<T>) -> Movement {
         let line = p.r.norm(p.s);
         // false for NaN
         if !(line > self.least_2 && line.is_finite()) {

@@ -25,10 +25,8 @@ pub(crate) struct Sight {
     pub(crate) clear: bool,
     /// how the direction moved
     pub(crate) movement: Movement,
-    /// there was a direction before
-    pub(crate) directed: bool,
-    /// in operation the phase is near
-    pub(crate) in_phase: bool,
+    /// there was a direction before, and there is none to compare it with
+    pub(crate) interrupted: bool,
     /// the instrument is in operation after this window
     pub(crate) in_operation: bool,
     /// it is in a fault
@@ -38,17 +36,18 @@ pub(crate) struct Sight {
 impl Continuity {
     //= specs/dsp.md#half-turns
     //# Half turns that may be lost MUST be said to be until it is acknowledged.
-    /// Takes note of a window; `most_unseen` windows are too few for 45 degrees.
-    pub(crate) fn see(&mut self, sight: Sight, most_unseen: u32) {
+    /// Takes note of a window; `most_unseen` windows are too few for 45 degrees. Where the phase is near in operation is
+    /// asked of `in_phase` only where it matters.
+    #[inline(always)]
+    pub(crate) fn see(&mut self, sight: Sight, most_unseen: u32, in_phase: impl FnOnce() -> bool) {
         self.unseen = if sight.valid && sight.clear { 0 } else { self.unseen.saturating_add(1) };
-        // a direction from nowhere, or none any more
-        let interrupted = sight.valid && sight.movement == Movement::Unknown && sight.directed;
-        let doubtful = sight.movement == Movement::Jumped
-            || interrupted
-            || !sight.in_phase
-            || sight.in_fault
-            || self.unseen > most_unseen;
-        self.lost |= self.counting && doubtful;
+        if self.counting && !self.lost {
+            self.lost = sight.movement == Movement::Jumped
+                || sight.interrupted
+                || sight.in_fault
+                || self.unseen > most_unseen
+                || !in_phase();
+        }
         self.counting |= sight.in_operation;
     }
 }

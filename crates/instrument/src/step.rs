@@ -195,6 +195,8 @@ impl<T: Float> Instrument<T> {
             half_turns_lost: state.status.half_turns_lost,
         };
         state.supervisor.count();
+        // all that there is to see in such a window
+        state.continuity.unseen = 0;
         (state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);
         if HOLD {
             state.rate = rate;
@@ -239,16 +241,17 @@ impl<T: Float> Instrument<T> {
         let pendulum = compensated.pendulum();
         // false where the compensation found no vibration behind the readout
         let valid = !spoilt && pendulum.e.is_finite();
-        let before = Sight {
-            valid,
-            clear: !(clipped || repeats),
-            movement: Movement::Unknown,
-            directed: state.precession.is_directed(),
-            in_phase: !(valid && in_operation(state.supervisor.mode)) || Supervisor::in_phase(&pendulum),
-            in_operation: false,
-            in_fault: false,
+        let was_in_operation = in_operation(state.supervisor.mode);
+        let (moved, interrupted) = if !valid {
+            (Movement::Unknown, false)
+        } else if self.precession.step_steadily(&mut state.precession, &pendulum) {
+            (Movement::Steady, false)
+        } else {
+            // a direction from nowhere, or none any more
+            let directed = state.precession.is_directed();
+            let moved = self.precession.step_otherwise(&mut state.precession, &pendulum);
+            (moved, directed && moved == Movement::Unknown)
         };
-        let moved = if valid { self.precession.step(&mut state.precession, &pendulum) } else { Movement::Unknown };
         let observation = Observation { pendulum, valid, clipped, repeats, jumped: moved == Movement::Jumped };
         let beat = match state.supervisor.mode {
             Mode::Listen => {
@@ -266,9 +269,16 @@ impl<T: Float> Instrument<T> {
         state.phasor = self.oscillator.tune(&state.phasor, state.seen.correction_rad_s);
         state.window = Window::begin(&state.phasor);
         let (mode, fault) = (state.supervisor.mode, state.supervisor.fault_now());
-        let sight =
-            Sight { movement: moved, in_operation: in_operation(mode), in_fault: mode == Mode::Fault, ..before };
-        state.continuity.see(sight, self.most_unseen);
+        let sight = Sight {
+            valid,
+            clear: !(clipped || repeats),
+            movement: moved,
+            interrupted,
+            in_operation: in_operation(mode),
+            in_fault: mode == Mode::Fault,
+        };
+        let in_phase = || !(valid && was_in_operation) || Supervisor::in_phase(&pendulum);
+        state.continuity.see(sight, self.most_unseen, in_phase);
         Status { mode, fault, fresh: false, clipped, valid, half_turns_lost: state.continuity.lost }
     }
 

@@ -82,11 +82,12 @@ impl<T: Float> Supervisor<T> {
             Mode::Hold => state.wish == Wish::Hold,
             _ => false,
         };
-        // one branch for all three
+        let next = state.windows.saturating_add(1);
+        // one branch for all three; what was out of bounds stays counted, untouched, until it is forgotten
         let counted = state.bad | state.repeats | state.clipped;
         as_wished
-            && counted == 0
-            && (state.windows.saturating_add(1) < self.forget || state.forgotten())
+            && (counted == 0 || (state.repeats == 0 && next < self.endure))
+            && (next < self.forget || state.forgotten())
             && p.e > self.low_2
             && p.e < self.high_2
             // together below the bound of the phase, which is below that of the quadrature

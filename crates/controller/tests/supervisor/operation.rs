@@ -158,6 +158,10 @@ fn an_instrument_goes_on_as_wished_where_nothing_is_counted_and_nothing_to_forge
         }
         for (bad, repeats, clipped) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)] {
             assert!(!on(SupervisorState { bad, repeats, clipped, ..state }, well()));
+            // until it is forgotten, what was out of bounds or clipped stays counted, untouched
+            let lately = |windows| SupervisorState { bad, repeats, clipped, windows, ..state };
+            assert_eq!(on(lately(ENDURE - 2), well()), repeats == 0);
+            assert!(!on(lately(ENDURE - 1), well()));
         }
         // what is left of earlier starts is forgotten by a whole step
         let dead = Some(Fault::DeadChannel);

@@ -56,7 +56,7 @@ fn prepared<T: Float>(i: &Instrument<T>, case: &Case) -> (State<T>, [T; 4]) {
     (state.supervisor.windows, state.supervisor.bad) = (windows, bad);
     (state.supervisor.repeats, state.supervisor.clipped) = (repeats, clipped);
     state.supervisor.starts = u8::try_from(starts).expect("few");
-    state.continuity = Continuity { unseen: 0, counting: true, lost: case.lost };
+    state.continuity = Continuity { unseen: clipped, counting: true, lost: case.lost };
     state.status.half_turns_lost = case.lost;
     let [energy, quadrature, rate, detuning] = case.integrals.map(t);
     (state.energy.integral, state.quadrature.integral, state.rate.integral) = (energy, quadrature, rate);
