@@ -203,16 +203,16 @@ mod tests {
 
     #[test]
     fn a_large_error_with_overtones_is_fitted_in_one_go_and_survives_reversal() {
-        let truth = AngleTable {
+        let planted = AngleTable {
             form: Form::Forward,
             cos: vec![0.0, 0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.01],
             sin: vec![0.0, 0.0, 0.0, 0.06, 0.0, 0.0, 0.0, 0.002],
         };
-        let samples = faulty(|phi| phi + truth.at(phi, 1.0).0);
+        let samples = faulty(|phi| phi + planted.at(phi, 1.0).0);
         let shape = Shape { form: Form::Forward, order: 8, motion: Motion::Rate, lines: vec![], free_gain: false };
         let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
         assert!((fitted.side[0] + 0.003).abs() < 1e-6, "{:?}", fitted.side);
-        for (a, b) in fitted.table.cos.iter().zip(&truth.cos) {
+        for (a, b) in fitted.table.cos.iter().zip(&planted.cos) {
             assert!((a - b).abs() < 1e-6, "{:?}", fitted.table);
         }
         let constant = fitted.constants[0].unwrap();
