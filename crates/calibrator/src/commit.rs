@@ -121,6 +121,8 @@ impl<T: Float> Calibrator<T> {
         set(delta, skew, k);
     }
 
+    //= specs/self-calibration.md#excitation
+    //# What was not excited MUST NOT be moved.
     /// The conditional mean of parameter `j` given what is committed of the detection.
     fn share(&self, s: &mut State<T>, j: usize) {
         let Some(p) = Parameter::ALL.get(j).copied() else { return };
@@ -132,8 +134,6 @@ impl<T: Float> Calibrator<T> {
         let of_phase = excess(Parameter::DetectionPhase) - ud.u(phase, ratio) * of_ratio - ud.u(phase, skew) * of_skew;
         let given =
             get(&s.filter.mean, p) + ud.u(j, phase) * of_phase + ud.u(j, ratio) * of_ratio + ud.u(j, skew) * of_skew;
-        //= specs/self-calibration.md#excitation
-        //# What was not excited MUST NOT be moved.
         let excited =
             ud.variance(j) < T::ratio(1, 4) && !(p.needs_known_precession() && s.schedule.angle_used < self.cycles(10));
         let coarse =

@@ -227,11 +227,7 @@ impl<T: Float> Instrument<T> {
         let hold_s = 0.5 * window_s;
         let lead_s = s.group_delay_s() + s.drive_delay_s + hold_s;
         let precession = Precession::new(window_s, 16.0 * window_s, s.fastest_rad_s, 0.1, lead_s, 0.2 * s.heard_v)?;
-        //= specs/dsp.md#no-other-days-clock
-        //# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
-        if s.readout.iter().any(|(id, _)| id.in_time()) {
-            return Err(ConfigError { parameter: "readout", expected: "free of what is told by a recording's clock" });
-        }
+        refuse_another_days_clock(s.readout)?;
         let mut effects = [(EffectId::DetectionGainMismatch, [T::zero(); MAX_PARAMETERS]); MOST_COMPENSATED];
         let readout = converted(s.readout, &mut effects)?;
         let readout = if readout.is_empty() { None } else { Some(Compensation::new(readout)?) };
@@ -274,6 +270,16 @@ fn most_unseen(fastest_rad: f64) -> u32 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and NaN is 0")]
     let windows = (FRAC_PI_4 / fastest_rad) as u32;
     windows
+}
+
+//= specs/dsp.md#no-other-days-clock
+//# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
+/// What is told by the clock of a recording says nothing of another day.
+fn refuse_another_days_clock(readout: &[(EffectId, [f64; MAX_PARAMETERS])]) -> Result<(), ConfigError> {
+    if readout.iter().any(|(id, _)| id.in_time()) {
+        return Err(ConfigError { parameter: "readout", expected: "free of what is told by a recording's clock" });
+    }
+    Ok(())
 }
 
 /// The effects with values in this scalar.
