@@ -131,7 +131,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     let after = heldout(&fitted.fit.hypothesis, &fitted.fit, None);
     let before = heldout(&declared_fit.hypothesis, &declared_fit, Some(&after));
     let ideal = Hypothesis { members: Vec::new(), force_scale: 0.0, ..fitted.fit.hypothesis.clone() };
-    let raw = bench.raw_angle_turns.then(|| heldout(&ideal, &fitted.fit, Some(&after)));
+    let raw = heldout(&ideal, &fitted.fit, Some(&after));
 
     let on_fit = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
     let dense = |role| evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, role, Window::Dense, None);
@@ -164,7 +164,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
             bench: &bench,
             fit: &fitted.fit,
             covariance: &covariance,
-            raw: raw.as_ref(),
+            raw: Some(&raw),
             declared: &before,
             discovered: &after,
             on_fit: &on_fit,
@@ -216,12 +216,12 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         actuation_gain_ratio,
         effects,
         heldout: Heldout {
-            raw: raw.as_ref().map(Evaluation::size),
+            raw: Some(raw.size()),
             declared: before.size(),
             discovered: after.size(),
             noise_floor_deg: noise_floor.to_degrees(),
         },
-        steps: stages(raw.as_ref(), &before, &after, &steps),
+        steps: stages(Some(&raw), &before, &after, &steps),
         residual: ResidualReport {
             harmonics: [Follows::Pattern, Follows::Table]
                 .into_iter()
@@ -245,7 +245,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
     }
     Ok(Identification {
         report,
-        figures: figures(&bench, raw.as_ref(), &before, &after, fitted.ring_downs),
+        figures: figures(&bench, Some(&raw), &before, &after, fitted.ring_downs),
         calibration,
         steps,
         picture,

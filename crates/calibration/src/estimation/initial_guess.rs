@@ -1,112 +1,18 @@
-//! Where a fit starts: the ellipse of a sensor whose offsets hide the angle, and the motion of each run.
+//! Where a fit starts: the motion of each run.
 //!
 //! From here on residuals are small against the period, so no angle is ever unwrapped against its neighbour again.
 
-use cvg_model::effects::{EffectId, Moment};
-use nalgebra::{Matrix5, Vector5};
+use cvg_model::effects::Moment;
 
 use crate::data::agreement::Gain;
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
 use crate::estimation::propagation::Start;
 use crate::estimation::statistics::{circular_mean, line, median, robust_deviation};
-use crate::model::hypothesis::{Hypothesis, Origin};
-use crate::recording::Instrument;
+use crate::model::hypothesis::Hypothesis;
 
-/// An ellipse through the readout of all tracks, as offsets, skew and gain ratio of a circle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Ellipse {
-    pub(crate) offset: [f64; 2],
-    pub(crate) skew: f64,
-    pub(crate) gain_ratio: f64,
-    /// radius of the circle behind it, V
-    pub(crate) radius: f64,
-}
-
-/// Samples that an ellipse needs no more of.
+/// Steps between neighbours that a first estimate needs no more of.
 const ENOUGH: usize = 20_000;
-
-impl Ellipse {
-    /// The conic of least algebraic distance through all readouts, refitted without its outliers.
-    pub(crate) fn through(tracks: &[Track]) -> Option<Self> {
-        let points: Vec<(f64, f64)> = tracks
-            .iter()
-            .flat_map(|t| {
-                let stride = (t.t_s.len() / ENOUGH).max(1);
-                t.segments.iter().flat_map(move |s| s.range.clone().step_by(stride)).map(|i| {
-                    let e = t.envelope(i);
-                    (e.x_c, e.y_c)
-                })
-            })
-            .collect();
-        let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
-        let centre = (median(&mut xs), median(&mut ys));
-        let scale = robust_deviation(points.iter().map(|p| (p.0 - centre.0).hypot(p.1 - centre.1)));
-        let local: Vec<(f64, f64)> =
-            points.iter().map(|p| ((p.0 - centre.0) / scale, (p.1 - centre.1) / scale)).collect();
-        let mut kept: Vec<(f64, f64)> = local.iter().copied().filter(|p| p.0.hypot(p.1) < 6.0).collect();
-        let mut conic = Vector5::zeros();
-        for _ in 0..3 {
-            conic = fit_conic(&kept)?;
-            let distance = |p: &(f64, f64)| terms(p).dot(&conic) - 1.0;
-            let spread = robust_deviation(local.iter().map(distance)).max(1e-9);
-            kept = local.iter().copied().filter(|p| distance(p).abs() < 6.0 * spread).collect();
-        }
-        let [a, b, c, d, e] = [conic[0], conic[1], conic[2], conic[3], conic[4]];
-        let determinant = 4.0 * a * c - b * b;
-        if determinant <= 0.0 {
-            return None;
-        }
-        let (x0, y0) = ((b * e - 2.0 * c * d) / determinant, (b * d - 2.0 * a * e) / determinant);
-        // x = A cos θ, y = g(A sin θ + s A cos θ): a x² + b xy + c y² with c = k/g², b = −2ks/g, a = k(1 + s²)
-        let skew_in_gain = -b / (2.0 * c);
-        let gain_ratio = ((a - b * b / (4.0 * c)) / c).sqrt();
-        // a x₀² + b x₀y₀ + c y₀² = 1 + (value at the centre) scales the radius: k A² = 1 + k(x₀² + …)
-        let centre_value = a * x0 * x0 + b * x0 * y0 + c * y0 * y0;
-        let k = a - b * b / (4.0 * c);
-        Some(Self {
-            radius: scale * ((1.0 + centre_value) / k).sqrt(),
-            offset: [centre.0 + scale * x0, centre.1 + scale * y0],
-            skew: skew_in_gain / gain_ratio,
-            gain_ratio,
-        })
-    }
-
-    /// Whether the raw readout circles the origin, so that its angle turns.
-    pub(crate) fn contains_origin(&self) -> bool {
-        let x = -self.offset[0];
-        let y = -self.offset[1] / self.gain_ratio - self.skew * x;
-        x.hypot(y) < self.radius
-    }
-
-    /// Puts the ellipse into a hypothesis.
-    pub(crate) fn install(&self, hypothesis: &mut Hypothesis) {
-        let mut put = |id, origin, values: &[f64]| {
-            let at = hypothesis.admit(id, origin);
-            hypothesis.members[at].values[..values.len()].copy_from_slice(values);
-        };
-        put(EffectId::DetectionOffset, Origin::Discovered, &self.offset);
-        put(EffectId::DetectionSkew, Origin::Discovered, &[self.skew]);
-        put(EffectId::DetectionGainMismatch, Origin::Declared, &[self.gain_ratio]);
-    }
-}
-
-fn terms(p: &(f64, f64)) -> Vector5<f64> {
-    Vector5::new(p.0 * p.0, p.0 * p.1, p.1 * p.1, p.0, p.1)
-}
-
-fn fit_conic(points: &[(f64, f64)]) -> Option<Vector5<f64>> {
-    if points.len() < 8 {
-        return None;
-    }
-    let (mut normal, mut right) = (Matrix5::zeros(), Vector5::zeros());
-    for p in points {
-        let t = terms(p);
-        normal += t * t.transpose();
-        right += t;
-    }
-    normal.cholesky().map(|c| c.solve(&right))
-}
 
 /// The motion of a track under a hypothesis: its angular gain, and where its segments start.
 #[derive(Debug, Clone, PartialEq)]
@@ -148,20 +54,12 @@ pub(crate) fn bearings(track: &Track, hypothesis: &Hypothesis, stride: usize) ->
         .collect()
 }
 
-/// Finds the motion of a track: tries the given angular gain, ± 1 for a sensor, and what neighbouring samples say, and
-/// keeps what leaves least.
+/// Finds the motion of a track: tries the given angular gain and what neighbouring samples say, and keeps what leaves least.
 pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, guess: Guess) -> Result<Motion, Refusal> {
     let bearings = bearings(track, hypothesis, track.stride);
     let guesses: Vec<f64> = match guess {
         Guess::Settled(k) => vec![k],
-        Guess::Open(given) => {
-            let mut guesses: Vec<f64> = given.into_iter().collect();
-            guesses.extend(neighbours(track, hypothesis, &bearings));
-            if hypothesis.instrument == Instrument::Sensor {
-                guesses.extend([1.0, -1.0]);
-            }
-            guesses
-        }
+        Guess::Open(given) => given.into_iter().chain(neighbours(track, hypothesis, &bearings)).collect(),
     };
     let motion = guesses
         .into_iter()

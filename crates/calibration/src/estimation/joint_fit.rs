@@ -9,7 +9,6 @@ use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, Window, fit, residuals};
 use crate::estimation::identifiability::Alike;
-use crate::estimation::initial_guess::{Ellipse, motion};
 use crate::estimation::propagation::{Pace, Start, walk};
 use crate::estimation::screening::{Screen, stated};
 use crate::estimation::statistics::{median, robust_deviation, white_noise};
@@ -64,16 +63,12 @@ pub(crate) struct Bench {
     pub(crate) start: Hypothesis,
     pub(crate) ring_down_runs: Vec<crate::recording::Run>,
     pub(crate) warnings: Vec<String>,
-    /// the ellipse of a sensor's readout
-    pub(crate) ellipse: Option<Ellipse>,
     /// rms of the energy and the quadrature command per unit of amplitude, V/V
     pub(crate) command_rms: [f64; 2],
     /// force scale and its uncertainty as the amplitude tells it, where no ring-down does
     pub(crate) energy_balance: Option<(f64, f64)>,
     /// Δω along both axes and its uncertainty, rad/s, as the quadrature loop tells it
     pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
-    /// the raw angle could be followed without centring the ellipse
-    pub(crate) raw_angle_turns: bool,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
     pub(crate) drive_is_free: bool,
     /// which runs are in, and which were left out and why
@@ -106,21 +101,6 @@ impl Bench {
             return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
         }
         let mut start = Hypothesis::ideal(instrument, period_rad, campaign.angular_gain.unwrap_or(0.8));
-        let mut raw_angle_turns = true;
-        let by_ellipse = instrument == Instrument::Sensor && tracks.iter().all(Track::has_amplitude);
-        let ellipse = by_ellipse.then(|| Ellipse::through(&tracks)).flatten();
-        if let Some(ellipse) = ellipse.filter(|e| !e.contains_origin()) {
-            // there is no angle to fit before the ellipse is centred
-            ellipse.install(&mut start);
-            raw_angle_turns = false;
-        }
-        if !raw_angle_turns {
-            warnings.push(
-                "the readout's offsets exceed its amplitude, so that the raw angle does not turn: the ellipse was \
-                 centred first, and heldout.raw is null"
-                    .into(),
-            );
-        }
         let mut prepared = Vec::new();
         let mut gains = Vec::new();
         for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
@@ -153,7 +133,6 @@ impl Bench {
         let command_rms = command_rms(&prepared);
         Ok(Self {
             instrument,
-            ellipse,
             command_rms,
             tracks: prepared,
             start,
@@ -161,7 +140,6 @@ impl Bench {
             warnings,
             energy_balance: None,
             quadrature_balance: None,
-            raw_angle_turns,
             drive_is_free: false,
             screen,
         })
@@ -187,21 +165,6 @@ impl Bench {
             _ => true,
         }));
         all
-    }
-
-    /// Follows every run anew under another hypothesis: where its segments start, and how far off it may be.
-    pub(crate) fn restart(&mut self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
-        for p in &mut self.tracks {
-            let motion = motion(&p.track, hypothesis, self.screen.guess(hypothesis.angular_gain))?;
-            let off = motion.deviation.max(LEAST_NOISE);
-            p.noise.angle = off;
-            if p.noise.amplitude.is_finite() {
-                p.noise.amplitude = off;
-            }
-            p.limit = Noise { angle: SPIKE * off, amplitude: f64::INFINITY };
-            p.starts = motion.starts;
-        }
-        Ok(())
     }
 
     /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.

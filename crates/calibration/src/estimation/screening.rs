@@ -26,8 +26,6 @@ const LOST: f64 = 0.2;
 #[derive(Debug, Default)]
 pub(crate) struct Screen {
     stated: Option<f64>,
-    /// the samples are so far apart that only what is settled may be followed
-    far_apart: bool,
     /// numbers of the rotation runs that are in
     pub(crate) kept: Vec<usize>,
     /// numbers of those that are not
@@ -52,11 +50,6 @@ impl Screen {
     /// The screen of a campaign with so many rotation runs.
     pub(crate) fn new(stated: Option<f64>, rotations: usize) -> Self {
         Self { stated, kept: (0..rotations).collect(), rotations, ..Self::default() }
-    }
-
-    /// What is known of the angular gain where the hypothesis has `k`.
-    pub(crate) fn guess(&self, k: f64) -> Guess {
-        if self.far_apart { Guess::Settled(k) } else { Guess::Open(Some(k)) }
     }
 
     /// The angular gain that the campaign states.
@@ -187,7 +180,7 @@ impl Screen {
     }
 
     /// Settles the angular gain where samples are so far apart that neighbours do not tell it.
-    fn settle(&mut self, tracks: &[Track], first: &[Motion], start: &Hypothesis) -> Result<Guess, Refusal> {
+    fn settle(&self, tracks: &[Track], first: &[Motion], start: &Hypothesis) -> Result<Guess, Refusal> {
         let plausible = match (self.stated, start.instrument) {
             (Some(k), _) => Plausible::Stated(k),
             (None, Instrument::Gyroscope) => Plausible::Resonator,
@@ -197,10 +190,7 @@ impl Screen {
         let followed = |i: usize| first.get(i).map(|m| m.angular_gain);
         match sampling(&steps, followed, (start.sense(), start.period_rad), plausible) {
             Sampling::Close => Ok(Guess::Open(self.stated)),
-            Sampling::Resolved(k) => {
-                self.far_apart = true;
-                Ok(Guess::Settled(k))
-            }
+            Sampling::Resolved(k) => Ok(Guess::Settled(k)),
             Sampling::Ambiguous(a) => Err(Refusal::no_answer(&a.run, a.problem(), a.wanted())),
         }
     }

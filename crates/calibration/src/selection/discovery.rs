@@ -13,7 +13,6 @@ use crate::diagnostics::residual::{Harmonic, WHITENESS_LAGS, autocorrelation, in
 use crate::error::Refusal;
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Window, fit};
-use crate::estimation::initial_guess::Ellipse;
 use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
@@ -94,9 +93,6 @@ pub(crate) fn discover(
     progress: &dyn Fn(&str),
 ) -> Result<(Fitted, Vec<Step>), Refusal> {
     let mut steps: Vec<Step> = Vec::new();
-    if let Some(ellipse) = bench.ellipse.filter(|_| bench.raw_angle_turns) {
-        (fitted, steps) = centre(bench, &fitted, &ellipse)?;
-    }
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
         let Some((next, step)) = best_step(bench, &fitted)? else {
@@ -135,59 +131,6 @@ fn question(bench: &Bench, fit: &mut Fit, steps: &mut [Step]) {
             step.doubt = Some(doubt);
         }
     }
-}
-
-/// Offsets and skew of a sensor come in together, from the ellipse that its readout draws: one without the other leads
-/// the fit of a large one astray. Each stays only if the data asks for it.
-fn centre(bench: &mut Bench, plain: &Fitted, ellipse: &Ellipse) -> Result<(Fitted, Vec<Step>), Refusal> {
-    let before = heldout(bench, &plain.fit);
-    let mut centred = plain.fit.hypothesis.clone();
-    centred.members.retain(|m| m.id != EffectId::DetectionGainMismatch);
-    ellipse.install(&mut centred);
-    bench.restart(&centred)?;
-    let mut fitted = fit_with_ring_downs(bench, &centred)?;
-    let mut steps = Vec::new();
-    for id in [EffectId::DetectionOffset, EffectId::DetectionSkew] {
-        let with = refit(bench, &fitted, &fitted.fit.hypothesis, CAREFUL);
-        let mut reduced = fitted.fit.hypothesis.clone();
-        reduced.members.retain(|m| m.id != id);
-        let without = refit(bench, &fitted, &reduced, CAREFUL);
-        let n = count(&with)
-            / sample_cost(&evaluate(
-                &bench.tracks,
-                &fitted.fit.hypothesis,
-                &fitted.fit.starts,
-                Role::Fit,
-                Window::Whole,
-                None,
-            ));
-        let plain = Candidate { id, values: id.neutral(), refine: None, tried: 1.0 };
-        let gain = n * (mean_square(&without) / mean_square(&with)).ln() - price(&plain, n);
-        if gain < LEAST_GAIN {
-            fitted = fit_with_ring_downs(bench, &reduced)?;
-        } else {
-            steps.push(Step {
-                id,
-                origin: Origin::Discovered,
-                gain,
-                rivals: Vec::new(),
-                heldout_rms_deg: [heldout(bench, &without), heldout(bench, &with)]
-                    .map(|square| square.sqrt().to_degrees()),
-                heldout: on_heldout(bench, &with).size(),
-                harmonics: pattern_harmonics(&on_heldout(bench, &with)),
-                confounded_with: Vec::new(),
-                energy_balance: None,
-                doubt: None,
-                contradicted: false,
-            });
-        }
-    }
-    if steps.is_empty() || heldout(bench, &fitted.fit) > before {
-        bench.restart(&plain.fit.hypothesis)?;
-        let plain = fit_with_ring_downs(bench, &plain.fit.hypothesis)?;
-        return Ok((plain, Vec::new()));
-    }
-    Ok((fitted, steps))
 }
 
 /// The best extension of a fitted hypothesis that earns its place.
