@@ -11,9 +11,10 @@ use crate::diagnostics::residual::{
 };
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
-use crate::estimation::fit::{Fit, Window};
+use crate::estimation::fit::Fit;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::calibration::Calibration;

@@ -7,7 +7,7 @@ use crate::diagnostics::picture::{Picture, picture_of};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
-use crate::estimation::fit::Residual;
+use crate::estimation::residuals::Residual;
 use crate::estimation::statistics::median;
 use crate::identification::{BiasCurve, Figures, Identification, run_report};
 use crate::model::hypothesis::{Hypothesis, Origin};

@@ -3,8 +3,9 @@
 
 use crate::data::track::wrapped;
 use crate::estimation::bias::angle_dependent_bias;
-use crate::estimation::fit::{Prepared, Residual, Window, residuals};
+use crate::estimation::fit::Prepared;
 use crate::estimation::propagation::Start;
+use crate::estimation::residuals::{Residual, Window, residuals};
 use crate::estimation::statistics::{circular_mean, line, robust_deviation, white_noise};
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::Role;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::diagnostics::evaluate::Evaluation;
-use crate::estimation::fit::Residual;
+use crate::estimation::residuals::Residual;
 use crate::estimation::statistics::median;
 
 /// What a harmonic follows.

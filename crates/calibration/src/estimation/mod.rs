@@ -12,6 +12,7 @@ pub(crate) mod joint_fit;
 pub(crate) mod linear;
 pub(crate) mod normal;
 pub(crate) mod propagation;
+pub(crate) mod residuals;
 pub(crate) mod restricted_likelihood;
 pub(crate) mod screening;
 pub(crate) mod simplex;

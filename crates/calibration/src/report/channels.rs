@@ -21,9 +21,10 @@ use crate::diagnostics::residual::{
     ljung_box, resolved_harmonics, strongest_line, white_band,
 };
 use crate::estimation::amplitude_equation::energy_balance;
-use crate::estimation::fit::{Fit, Residual};
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Bench;
 use crate::estimation::propagation::{Pace, Row, walk};
+use crate::estimation::residuals::Residual;
 use crate::model::hypothesis::Hypothesis;
 use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Role};

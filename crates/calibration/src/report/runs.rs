@@ -3,8 +3,9 @@
 use crate::data::agreement::Gain;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
-use crate::estimation::fit::{Fit, Residual, Window, residuals};
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Bench;
+use crate::estimation::residuals::{Residual, Window, residuals};
 use crate::recording::Role;
 use crate::report::{Estimate, RunReport};
 

@@ -7,8 +7,9 @@ use cvg_model::effects::EffectId;
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
-use crate::estimation::fit::{Fit, Window};
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Bench;
+use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 

@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
-use crate::estimation::fit::{Fit, Window, block_covariance, scaled_inverse};
+use crate::estimation::fit::{Fit, block_covariance, scaled_inverse};
 use crate::estimation::generalised_least_squares::{Refined, refine};
 use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
+use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::{Instrument, Role};
 use crate::selection::discovery::{LEAST_GAIN, Step, step_of};

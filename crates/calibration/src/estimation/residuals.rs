@@ -1,0 +1,110 @@
+//! What a hypothesis leaves of the recorded angle and amplitude, segment by segment, as columns.
+
+use rayon::prelude::*;
+
+use crate::data::track::{Segment, Track};
+use crate::estimation::fit::{Prepared, thinning};
+use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::statistics::circular_mean;
+use crate::model::hypothesis::{Hypothesis, direction};
+use crate::model::unknowns::Unknowns;
+use crate::recording::Role;
+
+/// What part of a segment is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Window {
+    /// all of it, as thinned as its track
+    Whole,
+    /// its beginning, every sample
+    Dense,
+}
+
+/// Samples of a dense window.
+const DENSE_SAMPLES: usize = 1 << 16;
+
+impl Window {
+    fn of(self, track: &Track, segment: &Segment) -> (Segment, usize) {
+        match self {
+            Self::Whole => (segment.clone(), track.stride),
+            Self::Dense => {
+                let r = &segment.range;
+                (Segment { range: r.start..r.end.min(r.start + DENSE_SAMPLES), role: segment.role }, 1)
+            }
+        }
+    }
+}
+
+/// Samples that tell where a segment starts.
+const START_SAMPLES: usize = 500;
+
+/// The residuals of a hypothesis on the segments of `role`, per track.
+pub(crate) fn residuals(
+    tracks: &[Prepared],
+    hypothesis: &Hypothesis,
+    starts: &[Vec<Start>],
+    role: Role,
+    window: Window,
+) -> Vec<Vec<Residual>> {
+    let none = Unknowns::new(hypothesis, Vec::new());
+    tracks
+        .par_iter()
+        .zip(starts)
+        .enumerate()
+        .map(|(number, (prepared, starts))| {
+            let track = &prepared.track;
+            let mut out = Vec::new();
+            for (segment, start) in track.segments.iter().zip(starts) {
+                if segment.role == role {
+                    let (segment, stride) = window.of(track, segment);
+                    let mut r = Residual::new(number, &segment);
+                    let mut start = *start;
+                    if role == Role::Holdout {
+                        // nothing was fitted here: where the segment starts is found first
+                        let mut angles = Vec::new();
+                        let coarse = Pace::every(thinning(track, hypothesis, segment.range.len(), START_SAMPLES));
+                        walk(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
+                        start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
+                    }
+                    let pace = Pace { stride, spike: prepared.limit.angle };
+                    walk(track, &segment, hypothesis, &none, start, pace, |row| r.push(track, row));
+                    out.push(r);
+                }
+            }
+            out
+        })
+        .collect()
+}
+
+/// Residuals of one segment, as columns.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Residual {
+    pub(crate) track: usize,
+    pub(crate) samples: usize,
+    pub(crate) t_s: Vec<f64>,
+    /// input angle since the segment's start, and the table's, rad
+    pub(crate) turned: Vec<f64>,
+    pub(crate) table: Vec<f64>,
+    /// direction of the vibration over the full turn, rad
+    pub(crate) direction: Vec<f64>,
+    /// nominal precession rate, rad/s
+    pub(crate) precession: Vec<f64>,
+    /// rad
+    pub(crate) angle: Vec<f64>,
+    pub(crate) amplitude: Vec<f64>,
+}
+
+impl Residual {
+    pub(crate) fn new(track: usize, segment: &Segment) -> Self {
+        Self { track, samples: segment.range.len(), ..Self::default() }
+    }
+
+    pub(crate) fn push(&mut self, track: &Track, row: &crate::estimation::propagation::Row<'_>) {
+        self.t_s.push(track.t_s[row.index]);
+        self.turned.push(row.turned);
+        self.table.push(track.input_rad[row.index]);
+        self.direction.push(direction(&row.vibration));
+        self.precession.push(row.precession);
+        self.angle.push(row.angle);
+        self.amplitude.push(row.amplitude);
+    }
+}
