@@ -292,7 +292,7 @@ fn a_drive_that_overflows_is_no_number_asked_for_too_much() {
     assert_eq!(allocation.step(&large, half, half).status, cvg_controller::Status::Limited);
 }
 
-//= specs/dsp.md#no-other-days-clock
+//= specs/dsp.md#clock-of-another-day
 //= type=test
 //# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
 #[test]

@@ -272,7 +272,7 @@ fn most_unseen(fastest_rad: f64) -> u32 {
     windows
 }
 
-//= specs/dsp.md#no-other-days-clock
+//= specs/dsp.md#clock-of-another-day
 //# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
 /// What is told by the clock of a recording says nothing of another day.
 fn refuse_another_days_clock(readout: &[(EffectId, [f64; MAX_PARAMETERS])]) -> Result<(), ConfigError> {
