@@ -14,8 +14,9 @@ use cvg_tests::{for_each_scalar, prop_assert_near};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 17] = [
+const IDS: [&str; 18] = [
     "detection-gain-mismatch",
+    "detection-phase",
     "detection-skew",
     "detection-offset",
     "detection-cubic",
@@ -282,6 +283,18 @@ proptest! {
         let (angle, amplitude) = readout_error(EffectId::DetectionSkew, &values(&[s]), a, theta, &Moment::default());
         prop_assert_near!(angle, 0.5 * s * (1.0 + (2.0 * theta).cos()), s.powi(2) + 1e-14);
         prop_assert_near!(amplitude, 0.5 * s * (2.0 * theta).sin(), s.powi(2) + 1e-14);
+    }
+
+    /// Q_d = E sin 2θ · sin φ; a quadrature of the opposite sign reads as none.
+    #[test]
+    fn prop_unequal_phase_lags_read_a_line_as_an_ellipse(lag in -0.5..0.5, a in sizes(), theta in angles()) {
+        let (sin, cos) = theta.sin_cos();
+        let line = Envelope::new(a * cos, 0.0, a * sin, 0.0);
+        let read = EffectId::DetectionPhase.read(&values(&[lag]), line, &Moment::default()).pendulum();
+        prop_assert_near!(read.e / (a * a), 1.0, 1e-14);
+        prop_assert_near!(read.q / (a * a), (2.0 * theta).sin() * lag.sin(), 1e-14);
+        let alike = EffectId::DetectionPhase.unread(&values(&[lag]), line, &Moment::default()).pendulum();
+        prop_assert_near!(alike.q / (a * a), -(2.0 * theta).sin() * lag.sin(), 1e-14);
     }
 
     #[test]

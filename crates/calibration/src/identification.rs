@@ -1,6 +1,6 @@
 //! The main job: a campaign in, the identified instrument out, with everything a reader needs to check it.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Shown};
+use cvg_model::effects::{EffectId, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
 use crate::angle_sensor;
@@ -212,7 +212,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
             Instrument::Gyroscope => "gyroscope".into(),
             Instrument::Sensor => "sensor".into(),
         },
-        angular_gain: knowledge.estimate(Unknown::AngularGain),
+        angular_gain: knowledge.angular_gain(),
         detection_gain_ratio,
         actuation_gain_ratio,
         effects,
@@ -351,6 +351,20 @@ impl Knowledge<'_> {
 
     fn estimate(&self, unknown: Unknown) -> Estimate {
         Estimate::new(self.hypothesis().get(unknown), self.deviation(unknown))
+    }
+
+    /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
+    /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for.
+    fn angular_gain(&self) -> Estimate {
+        let estimate = self.estimate(Unknown::AngularGain);
+        let slowest = self.bench.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
+        let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
+        let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
+        let slowed: f64 = causeless
+            .filter(|m| m.id.description().stage == Stage::Mechanics)
+            .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
+            .sum();
+        estimate.widened(slowed * estimate.value.abs())
     }
 
     /// The first parameter of the first member `id`, if it was fitted.

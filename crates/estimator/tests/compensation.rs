@@ -16,6 +16,7 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
     match id.description().id {
         "detection-cubic" => [0.08 * u, 0.04 * v, 0.0, 0.0],
         "detection-skew" => [1.5 * u, 0.0, 0.0, 0.0],
+        "detection-phase" => [0.4 * u, 0.0, 0.0, 0.0],
         "detection-gain-mismatch" => [1.0 + 0.4 * u, 0.0, 0.0, 0.0],
         "gain-drift" => [1e-3 * u, 0.0, 0.0, 0.0],
         "detection-offset" => [0.5 * u, 0.5 * v, 0.0, 0.0],

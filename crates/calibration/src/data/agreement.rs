@@ -10,6 +10,8 @@ use crate::estimation::statistics::median;
 const SHARE: f64 = 3e-3;
 /// and within what a drift of the pattern by this much makes of them, rad/s: 0.17 deg/s.
 const DRIFT_RAD_S: f64 = 3e-3;
+/// and, before a split is fitted, within what the quadrature that was read makes of one of this size, rad/s: 1 Hz,
+pub(crate) const LARGEST_SPLIT_RAD_S: f64 = 6.3;
 /// and within so many times what is left of the angle over the input that was turned through,
 const LEFT: f64 = 4.0;
 /// where no more than this counts, as a share of the period: what is left beyond it is no error of a readout.
@@ -28,10 +30,10 @@ pub(crate) struct Gain {
 
 impl Gain {
     /// A gain from a line that leaves `left`, rad, of an angle of this period over an input that covers `range`, rad, at a
-    /// mean speed, rad/s.
-    pub(crate) fn new(value: f64, left: f64, period: f64, range: f64, speed: f64) -> Self {
+    /// mean speed, rad/s, where the pattern may precess by `drift` rad/s besides.
+    pub(crate) fn new(value: f64, left: f64, period: f64, range: f64, [speed, drift]: [f64; 2]) -> Self {
         let by_readout = LEFT * left.min(LARGEST_LEFT * period) / range.max(f64::MIN_POSITIVE);
-        let by_drift = DRIFT_RAD_S / speed.max(f64::MIN_POSITIVE);
+        let by_drift = (DRIFT_RAD_S + drift) / speed.max(f64::MIN_POSITIVE);
         Self { value, within: SHARE * value.abs() + by_drift + by_readout }
     }
 
@@ -99,7 +101,7 @@ mod tests {
     use super::*;
 
     fn told(run: &str, k: f64) -> Told {
-        let gain = |value| Gain::new(value, 0.004, std::f64::consts::PI, 170.0, 8.7);
+        let gain = |value| Gain::new(value, 0.004, std::f64::consts::PI, 170.0, [8.7, 0.0]);
         Told { run: run.into(), all: gain(k), parts: vec![gain(k), gain(k)] }
     }
 
@@ -128,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_bias_at_a_slow_rate_is_no_disagreement() {
-        let slow = Gain::new(0.785, 0.004, std::f64::consts::PI, 170.0, 0.35);
-        assert!(slow.agrees(&Gain::new(0.78, 0.004, std::f64::consts::PI, 170.0, 8.7)));
+        let slow = Gain::new(0.785, 0.004, std::f64::consts::PI, 170.0, [0.35, 0.0]);
+        assert!(slow.agrees(&Gain::new(0.78, 0.004, std::f64::consts::PI, 170.0, [8.7, 0.0])));
     }
 }

@@ -23,6 +23,8 @@ const THROUGHOUT: f64 = 0.8;
 const CLIPPED: f64 = 2.0;
 /// A table and a rate agree within this share.
 const AGREE: f64 = 0.02;
+/// So many steps of both tell whether they do.
+const FEWEST_STEPS: usize = 16;
 /// A factor between them is a unit's within this share.
 const A_UNIT: f64 = 0.02;
 
@@ -245,20 +247,17 @@ fn leave_out(recording: &mut Recording, held: &[Range<usize>]) {
 /// rate in another unit, or with another sign, is said and passed over.
 fn references(recording: &Recording, name: &str, warnings: &mut Vec<String>) -> Option<Broken> {
     let (table, rate, t) = (recording.table_deg.as_deref()?, recording.rate_dps.as_deref()?, &recording.t_s);
-    // the step of the table that the rate predicts, where neither is near half a turn nor at rest
+    // steps of both where the table is not at rest: by the rate, and as much of it as is known of the table's, degrees
     let fastest = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
-    let mut factors: Vec<f64> = (1..t.len())
+    let steps: Vec<[f64; 2]> = (1..t.len())
         .filter(|&i| rate[i - 1].abs().min(rate[i].abs()) > 0.1 * fastest && rate[i - 1] * rate[i] > 0.0)
-        .filter_map(|i| {
-            let by_rate = 0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]);
-            let step = table[i] - table[i - 1];
-            let by_table = step - 360.0 * (step / 360.0).round();
-            (by_rate.abs() < 90.0 && by_table.abs() < 90.0).then(|| by_table / by_rate)
-        })
-        .filter(|f| f.is_finite())
+        .map(|i| [0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]), within_a_turn(table[i] - table[i - 1])])
+        .filter(|[by_rate, _]| by_rate.is_finite() && *by_rate != 0.0)
         .collect();
-    if factors.len() < 16 {
-        return None;
+    let close = steps.iter().filter(|step| step.iter().all(|d| d.abs() < 90.0));
+    let mut factors: Vec<f64> = close.map(|[by_rate, by_table]| by_table / by_rate).collect();
+    if factors.len() < FEWEST_STEPS {
+        return beyond_half_a_turn(&steps, name, warnings);
     }
     let factor = median(&mut factors);
     let mut off: Vec<f64> = factors.iter().map(|f| (f - factor).abs()).collect();
@@ -287,13 +286,51 @@ fn references(recording: &Recording, name: &str, warnings: &mut Vec<String>) -> 
         }
     }
     if is(-1.0) {
-        warnings.push(format!("{name}: rate_dps counts the other way than table_deg, which is used"));
+        warnings.push(the_other_way(name));
         return None;
     }
-    Some(Broken {
-        problem: format!("table_deg turns {factor:.4} times as fast as rate_dps says"),
-        wanted: "references that agree, or only the one that is right (the other column renamed)".into(),
-    })
+    Some(contradiction(format!("table_deg turns {factor:.4} times as fast as rate_dps says")))
+}
+
+/// The same where the table turns by up to a turn and more from row to row, so that its angle tells its steps but for whole
+/// turns: they are those of the rate, those of its opposite, or neither.
+fn beyond_half_a_turn(steps: &[[f64; 2]], name: &str, warnings: &mut Vec<String>) -> Option<Broken> {
+    if steps.len() < FEWEST_STEPS {
+        return None;
+    }
+    let off = |sign: f64| {
+        let mut off: Vec<f64> = steps.iter().map(|[r, t]| within_a_turn(t - sign * r)).collect();
+        let middle = median(&mut off);
+        let mut scatter: Vec<f64> = off.iter().map(|d| (d - middle).abs()).collect();
+        let mut size: Vec<f64> = steps.iter().map(|[r, _]| r.abs()).collect();
+        let unsure = 3.0 * median(&mut scatter) / (steps.len() as f64).sqrt();
+        (middle, AGREE * median(&mut size) + unsure)
+    };
+    let (ahead, allowed) = off(1.0);
+    if ahead.abs() <= allowed {
+        return None;
+    }
+    let (behind, allowed) = off(-1.0);
+    if behind.abs() <= allowed {
+        warnings.push(the_other_way(name));
+        return None;
+    }
+    Some(contradiction(format!(
+        "from row to row table_deg turns {ahead:.2}° further than rate_dps says, or whole turns more"
+    )))
+}
+
+fn the_other_way(name: &str) -> String {
+    format!("{name}: rate_dps counts the other way than table_deg, which is used")
+}
+
+fn contradiction(problem: String) -> Broken {
+    Broken { problem, wanted: "references that agree, or only the one that is right (the other column renamed)".into() }
+}
+
+/// An angle in degrees without its whole turns, −180 to 180.
+fn within_a_turn(deg: f64) -> f64 {
+    deg - 360.0 * (deg / 360.0).round()
 }
 
 #[cfg(test)]
@@ -399,6 +436,20 @@ mod tests {
         recording.xc_v.iter_mut().flatten().for_each(|v| *v = v.clamp(-0.8, 0.8));
         let findings = mend(&mut recording);
         assert!(findings.broken.is_some_and(|b| b.problem.contains("rows repeat")));
+    }
+
+    #[test]
+    fn references_of_a_slow_recording_are_compared_but_for_whole_turns() {
+        let every_half_second = |factor: f64| {
+            let t_s: Vec<f64> = (0..400).map(|i| 0.5 * f64::from(i)).collect();
+            let table = t_s.iter().map(|t| (250.0 * t * factor).rem_euclid(360.0)).collect();
+            Recording { rate_dps: Some(vec![250.0; 400]), table_deg: Some(table), t_s, ..recorded() }
+        };
+        let of = |factor: f64| references(&every_half_second(factor), "slow.csv", &mut Vec::new());
+        assert_eq!((of(1.0), of(-1.0), of(1.01)), (None, None, None));
+        for factor in [0.7, 1.04, 1.229, 1.5] {
+            assert!(of(factor).is_some_and(|b| b.problem.contains("from row to row")), "{factor}");
+        }
     }
 
     #[test]

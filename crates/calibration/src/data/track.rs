@@ -7,6 +7,7 @@ use std::ops::Range;
 use cvg_model::{ControlOutputs, Envelope};
 use rayon::prelude::*;
 
+use crate::data::agreement::LARGEST_SPLIT_RAD_S;
 use crate::error::Refusal;
 use crate::model::prediction::Commands;
 use crate::recording::{Recording, Role, Run};
@@ -206,6 +207,24 @@ impl Track {
         let step = (n / 1000).max(1);
         let turned: f64 = (step..n).step_by(step).map(|i| (self.input_rad[i] - self.input_rad[i - step]).abs()).sum();
         turned / (self.t_s[n - 1] - self.t_s[0])
+    }
+
+    /// How fast the input turns, and how fast the pattern may precess besides before a split is fitted, rad/s.
+    pub(crate) fn speed_and_drift(&self) -> [f64; 2] {
+        [self.mean_speed(), self.elastic_precession(LARGEST_SPLIT_RAD_S)]
+    }
+
+    /// How fast the quadrature that was read can precess the pattern at most, with a split of `split_rad_s`: the mean of
+    /// ½Δω|Q|/√(E² − Q²), rad/s.
+    fn elastic_precession(&self, split_rad_s: f64) -> f64 {
+        let step = (self.t_s.len() / 1000).max(1);
+        let ellipticity = |i: usize| {
+            let p = self.envelope(i).pendulum();
+            p.q.abs() / (p.e * p.e - p.q * p.q).max(f64::MIN_POSITIVE).sqrt()
+        };
+        let (sum, count) =
+            (0..self.t_s.len()).step_by(step).fold((0.0, 0.0), |(sum, n), i| (sum + ellipticity(i).min(1.0), n + 1.0));
+        0.5 * split_rad_s * sum / count
     }
 
     /// Mean input rate over the settled run, rad/s.

@@ -132,7 +132,7 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
             rest.push(value);
         }
         let (slope, _) = robust_line(&turned, &rest);
-        halves.extend(gains_of_halves(&turned, &rest, guess, (hypothesis, track.mean_speed())));
+        halves.extend(gains_of_halves(&turned, &rest, guess, (hypothesis, track.speed_and_drift())));
         let weight: f64 = turned.iter().map(|a| a * a).sum();
         gains.push((guess + sense * slope, weight));
         followed.push((turned, rest));
@@ -176,7 +176,12 @@ fn robust_line(x: &[f64], y: &[f64]) -> (f64, f64) {
 }
 
 /// What either half of a segment tells of the angular gain, where it covers a turn of the pattern.
-fn gains_of_halves(turned: &[f64], rest: &[f64], guess: f64, (hypothesis, speed): (&Hypothesis, f64)) -> Vec<Gain> {
+fn gains_of_halves(
+    turned: &[f64],
+    rest: &[f64],
+    guess: f64,
+    (hypothesis, motion): (&Hypothesis, [f64; 2]),
+) -> Vec<Gain> {
     let period = hypothesis.period_rad;
     let middle = turned.len() / 2;
     [0..middle, middle..turned.len()]
@@ -186,7 +191,7 @@ fn gains_of_halves(turned: &[f64], rest: &[f64], guess: f64, (hypothesis, speed)
             let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
             let (slope, left) = robust_line(x, y);
             let gain = guess + hypothesis.sense() * slope;
-            (gain.abs() * (high - low) > 2.0 * period).then(|| Gain::new(gain, left, period, high - low, speed))
+            (gain.abs() * (high - low) > 2.0 * period).then(|| Gain::new(gain, left, period, high - low, motion))
         })
         .collect()
 }

@@ -242,7 +242,7 @@ fn told(track: &Track, motion: &Motion, period: f64) -> Told {
         .flat_map(|s| [s.range.start, s.range.end - 1])
         .map(|i| track.input_rad[i])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    let all = Gain::new(motion.angular_gain, motion.deviation, period, high - low, track.mean_speed());
+    let all = Gain::new(motion.angular_gain, motion.deviation, period, high - low, track.speed_and_drift());
     Told { run: track.name.clone(), all, parts: motion.halves.clone() }
 }
 

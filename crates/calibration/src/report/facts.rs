@@ -71,6 +71,12 @@ impl Estimate {
         Self { value, ci95: [value - 1.96 * deviation, value + 1.96 * deviation] }
     }
 
+    /// The same value, less sure by so much on either side.
+    #[must_use]
+    pub(crate) fn widened(self, by: f64) -> Self {
+        Self { ci95: [self.ci95[0] - by, self.ci95[1] + by], ..self }
+    }
+
     /// Half the width of the interval.
     pub fn half_width(&self) -> f64 {
         0.5 * (self.ci95[1] - self.ci95[0])

@@ -83,7 +83,7 @@ pub(crate) fn tell_apart(
         run.angular_gain = Some(Estimate::new(own, deviation));
         run.bias_dps = Some(Estimate::new(drift.to_degrees(), drift_deviation.to_degrees()));
         run.rms_deg = Some(rms.to_degrees());
-        let gain = Gain::new(own, rms, fit.hypothesis.period_rad, of_input.range, track.track.mean_speed());
+        let gain = Gain::new(own, rms, fit.hypothesis.period_rad, of_input.range, [track.track.mean_speed(), 0.0]);
         let agrees = gain.agrees(&Gain { value: k, within: 0.0 });
         run.agrees = Some(agrees);
         if !agrees {

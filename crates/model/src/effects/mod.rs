@@ -19,6 +19,7 @@ pub mod anisoelasticity;
 pub mod detection_cubic;
 pub mod detection_gain_mismatch;
 pub mod detection_offset;
+pub mod detection_phase;
 pub mod detection_saturation;
 pub mod detection_skew;
 pub mod gain_drift;
@@ -378,6 +379,7 @@ library! {
     DetectionSkew => detection_skew::DetectionSkew,
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,
+    DetectionPhase => detection_phase::DetectionPhase,
     DetectionOffset => detection_offset::DetectionOffset,
     DetectionSaturation => detection_saturation::DetectionSaturation,
 }
