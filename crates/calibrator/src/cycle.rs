@@ -72,7 +72,7 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// What was seen beyond what is known, and what each parameter should have shown of it.
-    fn integrate(&self, s: &mut State<T>, c: usize) {
+    pub(crate) fn integrate(&self, s: &mut State<T>, c: usize) {
         let half_s = T::half() * self.cycle_s;
         let (h, direct) = rates(&s.sample, &s.correction.known, c, self.scaled(s));
         let change = if c == 1 { s.schedule.turn } else { pick(&s.sample.y, c) - pick(&s.before.y, c) };
@@ -131,7 +131,7 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
-    fn measure(&self, s: &mut State<T>, c: usize, k: u16) {
+    pub(crate) fn measure(&self, s: &mut State<T>, c: usize, k: u16) {
         match k {
             0 => self.innovate(s, c),
             19 => {
@@ -230,7 +230,7 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// One parameter a cycle may have wandered, while it is better known than expected of any device.
-    fn grow(&self, s: &mut State<T>, begin: bool) {
+    pub(crate) fn grow(&self, s: &mut State<T>, begin: bool) {
         if !begin {
             s.filter.ud.grow(&mut s.filter.growth);
             s.filter.ud.grow(&mut s.filter.growth);
@@ -249,7 +249,7 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// Whether the instrument turns: what nothing explains of the angle, against how well the precession is known.
-    fn detect(&self, s: &mut State<T>) {
+    pub(crate) fn detect(&self, s: &mut State<T>) {
         let sc = &mut s.schedule;
         sc.rate = sc.turn * self.cycles_per_s;
         sc.unexplained = sc.unexplained + T::ratio(1, 5) * (sc.rate - sc.unexplained);

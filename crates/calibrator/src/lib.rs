@@ -12,6 +12,8 @@ mod regressors;
 mod schedule;
 mod state;
 pub mod status;
+#[cfg(test)]
+mod tests;
 pub mod ud;
 mod window;
 

@@ -123,6 +123,25 @@ fn the_rate_loop_is_its_law_scaled_by_the_amplitude() {
 }
 
 #[test]
+fn a_heading_anywhere_is_approached_from_both_sides() {
+    let rate = RateLoop::tuned(12.0, 1.0, 1.5, 10.0, 5e-4, 100.0).expect("valid");
+    for k in -36..=36 {
+        let heading = f64::from(k) * 5.0_f64.to_radians();
+        let target = Heading::new(heading).expect("finite");
+        for off in [-0.7, -0.02, 0.0, 0.02, 0.7] {
+            let p = Orbit { a: 1.0, q: 0.0, theta: heading + off, delta: 0.0 }.envelope().pendulum();
+            let mut state = PiState::default();
+            let volts = rate.step(&mut state, &p, &target).volts;
+            // K [ε + ε T/2τ] with K = 2ζω/b and τ = ζ/ω
+            let error = 0.5 * f64::sin(2.0 * off);
+            assert_abs_diff_eq!(volts, 16.0 * error * (1.0 + 5e-4 * 6.0), epsilon = 1e-12);
+            assert_abs_diff_eq!(state.integral, 5e-4 * error, epsilon = 1e-15);
+        }
+    }
+    assert!(Heading::new(f64::INFINITY).is_err() && Heading::new(f64::NAN).is_err());
+}
+
+#[test]
 fn the_rate_loop_holds_no_more_than_its_largest_rate_and_its_limit() {
     // 3 rad/s at 1.5 1/s per V and unit amplitude: 2 V
     let rate = RateLoop::tuned(12.0, 1.0, 1.5, 3.0, 5e-4, LIMIT_V).expect("valid");

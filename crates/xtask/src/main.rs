@@ -3,18 +3,20 @@
 //! ```sh
 //! cargo xtask prove [--only TEXT]   # the bit-precise harnesses, by CBMC on the compiled code
 //! cargo xtask audit                 # every equation, every requirement, and what this run says of it
+//! cargo xtask faults [--only TEXT] [--every N]   # faults that an engineer makes, planted; tests have to catch each
 //! ```
 #![forbid(unsafe_code)]
 
 mod audit;
+mod faults;
 mod prove;
 mod source;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str =
-    "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER]";
+const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER] | \
+     cargo xtask faults [--only TEXT] [--every N]";
 
 /// What a task returns: whether everything held, or why it could not be found out.
 type Outcome = Result<bool, String>;
@@ -39,12 +41,26 @@ fn request<'a>(options: &[&'a str]) -> Option<audit::Request<'a>> {
     Some(request)
 }
 
+/// What `cargo xtask faults` is asked for.
+fn planted(options: &[&str]) -> Outcome {
+    let (mut only, mut every) = (None, 1);
+    for pair in options.chunks(2) {
+        match *pair {
+            ["--only", text] => only = Some(text),
+            ["--every", n] => every = n.parse().map_err(|_| USAGE.to_owned())?,
+            _ => return Err(USAGE.to_owned()),
+        }
+    }
+    faults::run(only, every)
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match arguments[..] {
         ["prove"] => prove::run(None),
         ["prove", "--only", text] => prove::run(Some(text)),
+        ["faults", ref options @ ..] => planted(options),
         ["audit", ref options @ ..] => request(options).map_or_else(|| Err(USAGE.to_owned()), audit::run),
         _ => Err(USAGE.to_owned()),
     };

@@ -6,6 +6,7 @@ mod interruptions;
 mod operation;
 mod settings;
 mod start;
+mod table;
 
 use cvg_controller::supervisor::{Beat, LONG_REST, Observation, Orders};
 use cvg_controller::{Fault, Mode, Supervisor, SupervisorSettings, SupervisorState, Wish};

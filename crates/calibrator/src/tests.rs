@@ -1,0 +1,63 @@
+//! What the calibrator believes of a device against what the device does, written out here: by differences of its own
+//! readout and drives, by dense matrices, and by hand.
+
+extern crate std;
+
+mod commits;
+mod cycles;
+mod mechanics;
+mod sums;
+
+use cvg_model::Envelope;
+
+use crate::complex::Complex;
+use crate::parameters::{N, Parameter, Vector};
+use crate::{Calibrator, Settings};
+
+/// No two of the settings are the same number, and none is one.
+fn settings() -> Settings {
+    Settings { amplitude_v: 1.6, drive_per_s: 2.5, damping_per_s: 0.04, ..Settings::default() }
+}
+
+fn calibrator() -> Calibrator<f64> {
+    Calibrator::new(&settings()).expect("inside its domain")
+}
+
+/// One parameter moved by a value in its own unit.
+fn unit(p: Parameter, value: f64) -> Vector<f64> {
+    let mut v = [0.0; N];
+    v[p as usize] = value;
+    v
+}
+
+/// X and Y as phasors x_c − i x_s.
+fn phasors(e: &Envelope<f64>) -> (Complex<f64>, Complex<f64>) {
+    (Complex::new(e.x_c, -e.x_s), Complex::new(e.y_c, -e.y_s))
+}
+
+fn envelope((x, y): (Complex<f64>, Complex<f64>)) -> Envelope<f64> {
+    Envelope::new(x.re, -x.im, y.re, -y.im)
+}
+
+/// A thin ellipse of amplitude `a`, ellipticity `epsilon`, at `theta`.
+fn orbit(a: f64, epsilon: f64, theta: f64) -> Envelope<f64> {
+    cvg_model::Orbit { a: a * epsilon.cos(), q: a * epsilon.sin(), theta, delta: 0.0 }.envelope()
+}
+
+/// ln of the amplitude, angle, ellipticity.
+fn shape(e: &Envelope<f64>) -> [f64; 3] {
+    let p = e.pendulum();
+    [0.5 * p.e.ln(), p.angle(), 0.5 * (p.q / p.e).asin()]
+}
+
+/// The difference of two shapes, the angle within a quarter turn.
+fn apart(a: &Envelope<f64>, b: &Envelope<f64>) -> [f64; 3] {
+    let ([l0, t0, e0], [l1, t1, e1]) = (shape(a), shape(b));
+    let turn = t0 - t1;
+    [l0 - l1, turn - core::f64::consts::PI * (turn / core::f64::consts::PI).round(), e0 - e1]
+}
+
+#[track_caller]
+fn near(got: f64, expected: f64, tolerance: f64) {
+    assert!((got - expected).abs() <= tolerance, "{got} and not {expected}");
+}

@@ -1,0 +1,446 @@
+//! The filter's cycle: slice by slice it does what a dense filter does at once.
+
+use cvg_model::{Float, Pendulum};
+
+use super::*;
+use crate::parameters::{DETECTION, OTHERS, Parameter as P, dot};
+use crate::regressors::{CHANNELS, rates, turned};
+use crate::state::{Commit, State};
+use crate::status::Mode;
+use crate::window::{Push, Sample};
+use crate::{Commands, Health};
+
+/// A state in its last stage, that runs, with numbers everywhere.
+fn busy() -> State<f64> {
+    let mut s = calibrator().start();
+    let value = |k: usize| ((k * 37 + 11) % 23) as f64 / 23.0 - 0.4;
+    (s.schedule.live, s.schedule.stage, s.schedule.fresh, s.schedule.settle) = (true, 4, 10, 0);
+    for c in 0..CHANNELS {
+        for j in 0..N {
+            s.filter.shown[c][j] = 0.1 * value(j + 5 * c);
+        }
+        s.filter.seen[c] = 0.02 * value(c);
+        s.filter.noise[c] = 1e-4 * (c + 1) as f64;
+        s.filter.last_innovation[c] = 1e-3 * value(c + 3);
+        s.before.y[c] = 0.1 * value(c + 7);
+        s.before.late[c] = 1e-3 * value(c + 9);
+    }
+    for j in 0..N {
+        s.filter.mean[j] = 0.05 * value(j + 2);
+    }
+    (s.before.cos_2, s.before.sin_2, s.before.whole, s.before.angle) = (0.6, -0.8, true, 1e-4);
+    let theta: f64 = 0.7;
+    s.sample = Sample {
+        y: [0.01, theta, 0.002],
+        per_amplitude: 0.9,
+        r: 0.01,
+        push: Push { along: 0.05, aside: 0.6, quadrature: 0.1, across: 0.01 },
+        early: [1e-3, 2e-3, 3e-3],
+        late: [4e-3, 5e-3, 6e-3],
+        cos: theta.cos(),
+        sin: theta.sin(),
+        cos_2: (2.0 * theta).cos(),
+        sin_2: (2.0 * theta).sin(),
+    };
+    s
+}
+
+fn covariance(s: &State<f64>) -> [[f64; N]; N] {
+    core::array::from_fn(|i| core::array::from_fn(|j| s.filter.ud.covariance(i, j)))
+}
+
+#[test]
+fn a_measurement_in_twenty_slices_is_that_of_a_dense_filter() {
+    for c in 0..CHANNELS {
+        let c_ = calibrator();
+        let mut s = busy();
+        let before = s;
+        let (h, mean, p) = (s.filter.shown[c], s.filter.mean, covariance(&s));
+        for k in 0..20 {
+            c_.measure(&mut s, c, k);
+        }
+        let ph: [f64; N] = core::array::from_fn(|i| (0..N).map(|j| p[i][j] * h[j]).sum());
+        let innovation = before.filter.seen[c] - dot(&h, &mean);
+        let change = innovation - before.filter.last_innovation[c];
+        let old = before.filter.noise[c];
+        let noise = old + 0.004 * ((0.5 * change * change).min(9.0 * old) - old);
+        near(s.filter.noise[c], noise, 1e-18);
+        let variance = noise + 3e-6 * 3e-6;
+        let all = variance + dot(&h, &ph);
+        assert!(s.schedule.accept);
+        for i in 0..N {
+            near(s.filter.mean[i], mean[i] + ph[i] / all * innovation, 1e-13);
+            for j in 0..N {
+                near(s.filter.ud.covariance(i, j), p[i][j] - ph[i] * ph[j] / all, 1e-13);
+            }
+        }
+        assert_eq!((s.filter.innovation[c], s.filter.last_innovation[c]), (innovation, innovation));
+        assert_eq!(s.schedule.angle_used, u16::from(c == 1));
+        // and then the cycle is past
+        let (rate, direct) = rates(&before.sample, &before.correction.known, c, true);
+        for j in 0..N {
+            near(s.filter.shown[c][j], 0.992 * h[j] + 0.02 * rate[j] - direct[j], 1e-15);
+        }
+        let ahead: f64 = (0..N).map(|j| (0.02 * rate[j] - direct[j]) * s.filter.mean[j]).sum();
+        near(s.before.angle, if c == 1 { ahead } else { before.before.angle }, 1e-16);
+        if c == 2 {
+            assert_eq!((s.before.y, s.before.late), (before.sample.y, before.sample.late));
+            assert_eq!((s.before.cos_2, s.before.sin_2), (before.sample.cos_2, before.sample.sin_2));
+        } else {
+            assert_eq!(s.before.y, before.before.y);
+        }
+        // the other channels are left alone
+        for other in (0..CHANNELS).filter(|o| *o != c) {
+            assert_eq!(s.filter.shown[other], before.filter.shown[other]);
+            assert_eq!(s.filter.noise[other], before.filter.noise[other]);
+        }
+    }
+}
+
+#[test]
+fn noise_is_learned_from_the_sixth_cycle_and_no_faster_than_nine_times_itself() {
+    let after = |fresh: u16, seen: f64| {
+        let mut s = busy();
+        (s.schedule.fresh, s.filter.seen[0]) = (fresh, seen);
+        calibrator().measure(&mut s, 0, 0);
+        s.filter.noise[0]
+    };
+    assert_eq!(after(5, 5.0), 1e-4);
+    near(after(6, 5.0), 1e-4 * (1.0 + 0.004 * 8.0), 1e-18);
+    near(after(u16::MAX, 5.0), 1e-4 * (1.0 + 0.004 * 8.0), 1e-18);
+    let quiet = busy();
+    let same = dot(&quiet.filter.shown[0], &quiet.filter.mean) + quiet.filter.last_innovation[0];
+    near(after(6, same), 1e-4 * 0.996, 1e-18);
+}
+
+#[test]
+fn an_innovation_beyond_six_deviations_is_refused_in_the_last_stage() {
+    for c in 0..CHANNELS {
+        for sign in [1.0, -1.0] {
+            let run = |stage: u8, deviations: f64| {
+                let mut s = busy();
+                (s.schedule.stage, s.schedule.fresh, s.schedule.refused) = (stage, 3, 7);
+                let floor = [1e-3, 5e-4, 1e-4, 2e-5, 3e-6, 3e-6][usize::from(stage)];
+                let all = s.filter.noise[c] + floor * floor + s.filter.ud.variance_along(&s.filter.shown[c]);
+                s.filter.seen[c] = dot(&s.filter.shown[c], &s.filter.mean) + sign * deviations * f64::sqrt(all);
+                for k in 0..20 {
+                    calibrator().measure(&mut s, c, k);
+                }
+                s
+            };
+            let within = run(4, 5.999);
+            assert!(within.schedule.accept && within.filter.mean != busy().filter.mean);
+            assert_eq!(within.schedule.refused, if c == 1 { 7 } else { 6 });
+            let beyond = run(4, 6.001);
+            assert!(!beyond.schedule.accept && beyond.filter.mean == busy().filter.mean);
+            assert_eq!(covariance(&beyond), covariance(&busy()));
+            assert_eq!((beyond.schedule.refused, beyond.schedule.hold[c]), if c == 1 { (7, 25) } else { (9, 1) });
+            for stage in 0..4 {
+                assert!(run(stage, 20.0).schedule.accept, "a coarse stage takes everything");
+            }
+        }
+    }
+    // what is no number is never taken, and a second of refusals begins the integrals anew
+    let mut s = busy();
+    s.filter.seen[0] = f64::NAN;
+    for k in 0..20 {
+        calibrator().measure(&mut s, 0, k);
+    }
+    assert!(!s.schedule.accept && s.filter.mean == busy().filter.mean);
+    let mut s = busy();
+    (s.filter.seen[2], s.schedule.hold[2]) = (1e3, 25);
+    calibrator().measure(&mut s, 2, 0);
+    calibrator().measure(&mut s, 2, 6);
+    assert_eq!((s.schedule.hold[2], s.filter.seen[2], s.filter.shown[2]), (0, 0.0, [0.0; N]));
+}
+
+#[test]
+fn an_angle_that_is_held_back_is_not_used_and_begins_anew() {
+    let mut s = busy();
+    s.schedule.hold[1] = 2;
+    calibrator().measure(&mut s, 1, 0);
+    assert_eq!((s.schedule.hold[1], s.schedule.accept), (1, false));
+    assert_eq!((s.filter.shown[1], s.filter.seen[1]), ([0.0; N], 0.0));
+    let mut s = busy();
+    s.schedule.hold = [3, 0, 3];
+    for c in [0, 2] {
+        calibrator().measure(&mut s, c, 0);
+        assert!(s.schedule.accept && s.schedule.hold[c] == 3, "the others are");
+    }
+    let mut s = busy();
+    s.schedule.fresh = 0;
+    calibrator().measure(&mut s, 0, 0);
+    assert!(!s.schedule.accept);
+}
+
+#[test]
+fn what_was_seen_and_what_should_have_shown_are_integrated_and_forgotten_slowly() {
+    for c in 0..CHANNELS {
+        let mut s = busy();
+        (s.schedule.turn, s.schedule.excited) = (0.03, true);
+        let before = s;
+        calibrator().integrate(&mut s, c);
+        let (h, direct) = rates(&before.sample, &before.correction.known, c, true);
+        let change = if c == 1 { 0.03 } else { before.sample.y[c] - before.before.y[c] };
+        let seen = change - before.before.late[c] - before.sample.early[c];
+        near(s.filter.seen[c], 0.992 * before.filter.seen[c] + seen, 1e-16);
+        let mut expected = before.filter.shown[c];
+        let mut new = 0.0;
+        for j in 0..N {
+            expected[j] += 0.02 * h[j] + direct[j];
+            new += (0.02 * h[j] + direct[j]) * before.filter.mean[j];
+        }
+        if c == 1 {
+            near(s.schedule.turn, seen - new - 1e-4, 1e-16);
+        } else {
+            let now = turned(c, before.sample.cos_2, before.sample.sin_2, 0.015);
+            let then = turned(c, 0.6, -0.8, 0.015);
+            for k in 0..DETECTION {
+                expected[OTHERS + k] += now[k] + then[k];
+            }
+        }
+        for j in 0..N {
+            near(s.filter.shown[c][j], expected[j], 1e-16);
+        }
+        // without a cycle before, or before the loops have settled, nothing is kept
+        for spoil in [|s: &mut State<f64>| s.before.whole = false, |s: &mut State<f64>| s.schedule.fresh = 0] {
+            let mut s = before;
+            spoil(&mut s);
+            calibrator().integrate(&mut s, c);
+            assert_eq!((s.filter.shown[c], s.filter.seen[c]), ([0.0; N], 0.0));
+        }
+    }
+    // at rest a turn tells nothing of the detection
+    let mut s = busy();
+    (s.schedule.turn, s.schedule.excited) = (0.03, false);
+    let before = s.filter.shown[0];
+    calibrator().integrate(&mut s, 0);
+    assert_eq!(s.filter.shown[0][OTHERS..], before[OTHERS..]);
+}
+
+#[test]
+fn rotation_is_noticed_by_what_nothing_explains_of_the_angle() {
+    let detect = |change: fn(&mut State<f64>)| {
+        let mut s = busy();
+        s.sample.push.aside = 0.0;
+        s.schedule.fresh = 3;
+        change(&mut s);
+        calibrator().detect(&mut s);
+        s
+    };
+    // a fifth of the way each cycle: above 0.02 rad/s and twice the doubt of a constant rate, here 0.02 of it
+    for sign in [1.0, -1.0] {
+        for (rate, moving) in [(0.0599, false), (0.0601, true)] {
+            let mut s = busy();
+            (s.sample.push.aside, s.schedule.turn) = (0.0, sign * 5.0 * rate / 25.0);
+            calibrator().detect(&mut s);
+            near(s.schedule.rate, sign * 5.0 * rate, 1e-14);
+            near(s.schedule.unexplained, sign * rate, 1e-14);
+            assert_eq!(s.schedule.excited, moving, "{rate}");
+            assert_eq!((s.schedule.moving, s.schedule.hold[1]), if moving { (49, 25) } else { (0, 0) });
+            // the integrals begin anew when it begins
+            assert_eq!(s.schedule.fresh, if moving { 1 } else { 11 });
+        }
+        // a force scale in doubt by a tenth explains 2.5 times its share of a precession
+        let mut s = busy();
+        (s.sample.push.aside, s.schedule.turn) = (-1.0, sign * 5.0 * 0.3 / 25.0);
+        calibrator().detect(&mut s);
+        assert!(!s.schedule.excited);
+        s.schedule.turn = sign * 5.0 * 0.35 / 25.0;
+        s.schedule.unexplained = 0.0;
+        calibrator().detect(&mut s);
+        assert!(s.schedule.excited);
+    }
+    // it is over two seconds after it was seen last
+    let s = detect(|s| s.schedule.moving = 1);
+    assert_eq!((s.schedule.moving, s.schedule.excited, s.schedule.hold[1]), (0, true, 25));
+    let s = detect(|_| {});
+    assert!(!s.schedule.excited && s.schedule.hold[1] == 0);
+    // the first rest after a start in rotation: what it tells was never seen before
+    let stage = |used: u16, stage: u8| {
+        let mut s = busy();
+        s.sample.push.aside = 0.0;
+        (s.schedule.moving, s.schedule.angle_used, s.schedule.stage, s.schedule.used) = (1, used, stage, 99);
+        calibrator().detect(&mut s);
+        (s.schedule.stage, s.schedule.used)
+    };
+    assert_eq!((stage(249, 4), stage(249, 2)), ((1, 0), (1, 0)));
+    assert_eq!((stage(250, 4), stage(249, 1), stage(249, 0)), ((4, 99), (1, 99), (0, 99)));
+    // loops settle before anything is integrated
+    let s = detect(|s| s.schedule.settle = 2);
+    assert_eq!((s.schedule.settle, s.schedule.fresh), (1, 0));
+    assert_eq!(detect(|s| s.schedule.fresh = u16::MAX).schedule.fresh, u16::MAX);
+}
+
+#[test]
+fn a_parameter_a_cycle_may_have_wandered_while_it_is_better_known_than_expected() {
+    let c = calibrator();
+    let mut s = busy();
+    s.filter.ud = crate::ud::Ud::diagonal(0.25);
+    for turn in 0..2 * N {
+        let j = s.filter.growing;
+        assert_eq!(j, turn % N, "one after the other");
+        let before = s.filter.ud.variance(j);
+        for k in 65..77 {
+            c.grow(&mut s, k == 65);
+        }
+        let wander = P::ALL[j].wander::<f64>() / P::ALL[j].expected::<f64>();
+        near(s.filter.ud.variance(j) - before, wander * wander * 0.04 * 19.0, 1e-16);
+    }
+    // not while nothing is learned, and not beyond what is expected
+    for spoil in
+        [|s: &mut State<f64>| s.schedule.live = false, |s: &mut State<f64>| s.filter.ud = crate::ud::Ud::diagonal(1.0)]
+    {
+        let mut s = busy();
+        s.filter.ud = crate::ud::Ud::diagonal(0.25);
+        spoil(&mut s);
+        let before = covariance(&s);
+        for k in 65..77 {
+            c.grow(&mut s, k == 65);
+        }
+        assert_eq!(covariance(&s), before);
+    }
+}
+
+/// What the loops see of a device at rest.
+fn calm(i: usize) -> (Pendulum<f64>, (f64, f64), Commands<f64>) {
+    let theta = 1e-3 * i as f64;
+    let k = 1.6 * 1.6;
+    let (sin_2, cos_2) = (2.0 * theta).sin_cos();
+    let p = Pendulum { e: 1.01 * k, q: 2e-3 * k, r: cos_2 * k, s: sin_2 * k, l: 1e-3 * k };
+    (p, (theta.cos(), theta.sin()), Commands { energy_v: -0.05, precession_v: 0.1, quadrature_v: 0.2 })
+}
+
+#[test]
+fn eighty_control_steps_are_a_cycle_and_each_has_its_slice() {
+    let c = calibrator();
+    let mut s = busy();
+    (s.step, s.closed) = (0, crate::window::Sums::empty());
+    for i in 0..160 {
+        let (p, direction, commands) = calm(i);
+        let before = s;
+        c.step(&mut s, &p, direction, &commands, Health::Operating);
+        assert_eq!(usize::from(s.step), (i + 1) % 80);
+        if i == 79 {
+            assert_eq!(s.sums, crate::window::Sums::empty(), "the next begins");
+            let sample = s.closed.close(5e-4).expect("a whole cycle");
+            near(sample.y[0], 0.5 * f64::ln(1.01), 1e-8);
+        }
+        if i >= 80 {
+            let learned = (before.filter.mean != s.filter.mean, (25, 45, 65));
+            // the mean moves at the end of a measurement and nowhere else
+            let expected = [24, 44, 64].contains(&(i - 80));
+            assert!(!learned.0 || expected, "slice {}", i - 80);
+        }
+    }
+    assert!(s.schedule.live);
+    // a lone disturbed step spoils its cycle
+    for at in [0, 41, 79] {
+        let mut s = c.start();
+        for i in 0..81 {
+            let (p, direction, commands) = calm(i);
+            let health = if i == at { Health::Disturbed } else { Health::Operating };
+            c.step(&mut s, &p, direction, &commands, health);
+        }
+        assert!(!s.schedule.live, "step {at}");
+        assert_eq!((s.schedule.settle, s.before.whole), (37, false));
+    }
+}
+
+#[test]
+fn the_turn_of_a_cycle_is_the_shorter_way_round() {
+    let c = calibrator();
+    for (from, to, expected) in [(3.1, -3.1, 2.0 * f64::PI - 6.2), (-3.1, 3.1, 6.2 - 2.0 * f64::PI), (0.3, 0.35, 0.05)]
+    {
+        let mut s = busy();
+        s.before.y[1] = from;
+        let mut sums = crate::window::Sums::empty();
+        let push = Push { along: 0.0, aside: 0.0, quadrature: 0.0, across: 0.0 };
+        let p = Pendulum { e: 1.0, q: 0.0, r: 0.0, s: 0.0, l: 0.0 };
+        for _ in 0..80 {
+            sums.add(&p, (f64::cos(to), f64::sin(to)), (f64::cos(to), f64::sin(to)), &push, &[0.0; N]);
+        }
+        s.closed = sums;
+        (s.sample, s.step) = (sums.close(5e-4).expect("whole"), 1);
+        c.work(&mut s);
+        near(s.schedule.turn, expected, 1e-12);
+    }
+}
+
+#[test]
+fn the_virtual_precession_goes_to_and_fro_in_its_stages() {
+    let c = calibrator();
+    let at = |stage: u8, moving: u16, settle: u16, second: u32| {
+        let mut s = busy();
+        let sc = &mut s.schedule;
+        (sc.stage, sc.moving, sc.settle, sc.fresh) = (stage, moving, settle, 0);
+        sc.profile = 25 * second;
+        c.plan(&mut s);
+        s.precession
+    };
+    let full = 0.698_131_7;
+    for second in 0..40 {
+        let sign = |hold: u32| if (second / hold) % 2 == 1 { -1.0 } else { 1.0 };
+        assert_eq!(at(0, 0, 1, second), 0.0, "it waits for the loops at first");
+        for stage in [0, 1] {
+            assert_eq!(at(stage, 0, 0, second), sign(5) * full);
+        }
+        assert_eq!(at(1, 0, 1, second), sign(5) * full);
+        let slow = if (second / 18) % 2 == 1 { 0.5 } else { 1.0 };
+        for stage in [2, 4] {
+            assert_eq!(at(stage, 0, 0, second), sign(9) * slow * full);
+            assert_eq!(at(stage, 1, 0, second), sign(1) * 0.05);
+        }
+    }
+    let mut s = busy();
+    s.schedule.live = false;
+    c.plan(&mut s);
+    assert_eq!((s.precession, s.schedule.profile, s.schedule.used), (0.0, 1, 0));
+}
+
+#[test]
+fn a_commit_is_due_after_the_seconds_of_its_stage() {
+    let c = calibrator();
+    for (stage, seconds) in [(0, 10), (1, 10), (2, 20), (3, 20), (4, 40), (5, 40)] {
+        let due = |used: u32, score: f64| {
+            let mut s = busy();
+            (s.schedule.stage, s.schedule.used, s.score) = (stage, used, score);
+            c.plan(&mut s);
+            (s.schedule.used, s.schedule.commit)
+        };
+        let last = 25 * seconds - 1;
+        assert_eq!((due(last - 1, 0.0), due(last, 0.0)), ((last, Commit::None), (last + 1, Commit::Forth)));
+        // what predicts far worse than before is taken back at once
+        assert_eq!((due(3, -20.0).1, due(3, -20.001).1), (Commit::None, Commit::Back));
+    }
+    // when for long nothing is as it was learned, the mechanics are others now
+    let mut s = busy();
+    s.schedule.refused = 1000;
+    c.plan(&mut s);
+    assert_eq!(s.schedule.stage, 4);
+    s.schedule.refused = 1001;
+    c.plan(&mut s);
+    assert_eq!((s.schedule.stage, s.schedule.refused, s.schedule.settle), (0, 0, 37));
+}
+
+#[test]
+fn what_goes_on_is_told() {
+    let c = calibrator();
+    let mut s = busy();
+    let told = |s: &State<f64>| c.status(s);
+    assert_eq!((told(&s).mode, told(&s).learned), (Mode::AtRest, true));
+    (s.schedule.moving, s.schedule.stage) = (1, 3);
+    assert_eq!((told(&s).mode, told(&s).learned), (Mode::Turning, false));
+    s.schedule.settle = 1;
+    assert_eq!(told(&s).mode, Mode::Settling);
+    // ½√(0.03² + 0.006²) of bias for what nobody told
+    near(told(&s).bias_rad, 0.5 * 0.03_f64.hypot(0.006), 1e-15);
+    for (sigma, known) in [(0.13, true), (0.1307, true), (0.131, false)] {
+        s.filter.ud = crate::ud::Ud::diagonal(sigma * sigma);
+        assert_eq!(told(&s).detection_known, known, "{sigma}");
+    }
+    let ratio = s.estimate(P::DetectionRatio).expect("told");
+    near(ratio.value, 0.03 * s.filter.mean[P::DetectionRatio as usize], 1e-15);
+    near(ratio.sigma, 0.131 * 0.03, 1e-15);
+    assert!(P::ALL.iter().take(OTHERS).all(|p| s.estimate(*p).is_none()));
+}

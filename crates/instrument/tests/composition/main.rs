@@ -1,0 +1,173 @@
+//! The instrument is its parts, joined: the same step, written here without short ways, from parts that are made here of
+//! the settings, leaves the same state to the last bit, whatever happens to the vibration and to the converters.
+
+mod parts;
+mod script;
+
+use cvg_instrument::{Instrument, Mode, Settings, State, Tuning, Wish};
+use cvg_model::Float;
+use cvg_model::effects::{EffectId, Values};
+use proptest::prelude::*;
+
+use parts::Parts;
+use script::{Event, Vibration, event};
+
+const UNEVEN: &[(EffectId, Values<f64>)] = &[
+    (EffectId::DetectionCubic, [0.05, 0.01, 0.0, 0.0]),
+    (EffectId::DetectionGainMismatch, [1.0132, 0.0, 0.0, 0.0]),
+    (EffectId::DetectionOffset, [0.01, -0.02, 0.0, 0.0]),
+];
+const LATE: &[(EffectId, Values<f64>)] =
+    &[(EffectId::AngleLatency, [2e-3, 0.0, 0.0, 0.0]), (EffectId::DetectionSkew, [0.03, 0.0, 0.0, 0.0])];
+const CLIPPED: &[(EffectId, Values<f64>)] = &[(EffectId::DetectionSaturation, [0.9, 0.0, 0.0, 0.0])];
+const DRIVES: &[(EffectId, Values<f64>)] =
+    &[(EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]), (EffectId::ActuationSkew, [0.02, 0.0, 0.0, 0.0])];
+
+/// Settings of which no two that belong to different parts are the same number.
+fn settings(which: usize) -> Settings<'static> {
+    let tuning = |bandwidth_hz, damping| Tuning { bandwidth_hz, damping };
+    let other = Settings {
+        carrier_hz: 14_321.0,
+        band: 0.019,
+        sample_hz: 96_000.0,
+        window: 37,
+        adc_full_scale_v: 1.9,
+        dac_limit_v: 0.9,
+        readout_delay_s: 7e-6,
+        drive_delay_s: 13e-6,
+        amplitude_v: 0.75,
+        drive_per_s_v: 1.7,
+        energy: tuning(3.0, 0.8),
+        quadrature: tuning(6.0, 0.6),
+        phase: tuning(25.0, 0.9),
+        rate: tuning(2.5, 1.1),
+        hold_rad: 0.35,
+        fastest_rad_s: 41.0,
+        heard_v: 0.03,
+        sweep_s: 0.05,
+        readout: &[],
+        actuation: &[],
+    };
+    match which {
+        0 => Settings { sweep_s: 0.05, ..Settings::default() },
+        1 => Settings { readout: UNEVEN, actuation: DRIVES, ..other },
+        2 => Settings { readout: LATE, ..other },
+        _ => Settings { readout: CLIPPED, window: 24, hold_rad: -0.2, ..Settings::default() },
+    }
+}
+
+/// The bits, but for the sign of zero.
+fn words<T: Float>(state: &State<T>) -> String {
+    format!("{state:?}").replace("-0.0,", "0.0,").replace("-0.0 ", "0.0 ").replace("-0.0)", "0.0)")
+}
+
+/// Both through a script; the modes that were passed.
+fn compare<T: Float>(which: usize, script: &[Event]) -> Vec<Mode> {
+    let settings = settings(which);
+    let instrument = Instrument::<T>::new(&settings).expect("inside its domain");
+    let parts = Parts::<T>::of(&settings);
+    let (mut state, mut joined) = (instrument.start(), instrument.start());
+    let mut vibration = Vibration::new(&settings);
+    let mut modes = Vec::new();
+    for event in script {
+        for s in [&mut state, &mut joined] {
+            match event {
+                Event::Wish(wish) => s.wish(*wish),
+                Event::Acknowledge => s.acknowledge_half_turns(),
+                _ => {}
+            }
+        }
+        vibration.happens(event);
+        for _ in 0..event.windows() * u32::from(settings.window) {
+            let [x, y] = vibration.sample().map(T::from_f64);
+            let said = instrument.step(&mut state, x, y);
+            let expected = parts.step(&mut joined, x, y);
+            assert!(said == expected, "{event:?} of {script:?}\n{said:?}\n{expected:?}");
+            if said.2.fresh {
+                assert_eq!(words(&state), words(&joined), "{event:?} of {script:?}");
+                if modes.last() != Some(&said.2.mode) {
+                    modes.push(said.2.mode);
+                }
+            }
+        }
+    }
+    modes
+}
+
+fn all_settings<T: Float>(script: &[Event]) -> Vec<Vec<Mode>> {
+    (0..4).map(|which| compare::<T>(which, script)).collect()
+}
+
+/// In operation, for so many windows more.
+fn running(more: u32) -> Vec<Event> {
+    vec![Event::Well(120), Event::Well(more)]
+}
+
+fn in_both_precisions(script: &[Event], passes: &[Mode]) {
+    for modes in all_settings::<f32>(script).into_iter().chain(all_settings::<f64>(script)).step_by(2) {
+        for mode in passes {
+            assert!(modes.contains(mode), "{mode:?} is not among {modes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_start_from_a_vibration_that_is_heard() {
+    in_both_precisions(&running(300), &[Mode::Lock, Mode::SpinUp, Mode::WholeAngle]);
+}
+
+#[test]
+fn a_start_from_silence_sweeps_and_ends_in_a_fault() {
+    in_both_precisions(&[Event::Silent(2400)], &[Mode::Sweep, Mode::Listen, Mode::Fault]);
+}
+
+#[test]
+fn a_pattern_that_turns_in_both_senses() {
+    for rate in [9.0, -9.0] {
+        let mut script = running(10);
+        script.extend([Event::Rate(rate), Event::Well(800)]);
+        in_both_precisions(&script, &[Mode::WholeAngle]);
+    }
+}
+
+#[test]
+fn every_wish_from_every_other() {
+    let wishes = [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off];
+    for from in wishes {
+        let mut script = running(5);
+        for to in wishes {
+            script.extend([Event::Wish(from), Event::Well(130), Event::Wish(to), Event::Well(130)]);
+        }
+        in_both_precisions(&script, &[Mode::WholeAngle, Mode::Hold, Mode::RingDown]);
+    }
+}
+
+#[test]
+fn whatever_is_wrong_with_a_converter() {
+    for hold in [false, true] {
+        for what in script::wrongs() {
+            let mut script = running(20);
+            script.extend([Event::Wish(if hold { Wish::Hold } else { Wish::WholeAngle }), Event::Well(30)]);
+            script.extend([what, Event::Well(60), Event::Acknowledge, Event::Well(40)]);
+            all_settings::<f32>(&script);
+            all_settings::<f64>(&script);
+        }
+    }
+}
+
+#[test]
+fn a_fault_and_the_way_back() {
+    let mut script = running(20);
+    script.extend([Event::Amplitude(1.9), Event::Well(900), Event::Amplitude(1.0), Event::Well(1900)]);
+    in_both_precisions(&script, &[Mode::Fault, Mode::WholeAngle]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #[test]
+    fn whatever_happens_in_whatever_order(which in 0_usize..4, events in prop::collection::vec(event(), 1..24)) {
+        let script: Vec<Event> = running(20).into_iter().chain(events).collect();
+        compare::<f32>(which, &script);
+        compare::<f64>(which, &script);
+    }
+}
