@@ -1,5 +1,6 @@
 //! What the calibrator believes of a device against what the device does, written out here: by differences of its own
 //! readout and drives, by dense matrices, and by hand.
+#![allow(clippy::needless_range_loop, reason = "vectors and matrices are written with their indices")]
 
 extern crate std;
 

@@ -124,7 +124,7 @@ fn the_rate_loop_is_its_law_scaled_by_the_amplitude() {
 
 #[test]
 fn a_heading_anywhere_is_approached_from_both_sides() {
-    let rate = RateLoop::tuned(12.0, 1.0, 1.5, 10.0, 5e-4, 100.0).expect("valid");
+    let rate = RateLoop::tuned(12.0, 1.0, 1.5, 100.0, 5e-4, 100.0).expect("valid");
     for k in -36..=36 {
         let heading = f64::from(k) * 5.0_f64.to_radians();
         let target = Heading::new(heading).expect("finite");

@@ -198,8 +198,9 @@ impl<T: Float> PrecessionState<T> {
     /// The unwrapped angle as half turns and the angle within (−90°, 90°], rad: **Equation 4** with its jumps counted.
     /// 0 where there is no direction.
     pub fn angle(&self) -> (i32, T) {
+        let zero = T::zero();
         // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
-        let within = T::half() * (self.sin_2 + T::zero()).atan2(self.cos_2);
+        let within = Pendulum { e: T::one(), q: zero, r: self.cos_2, s: self.sin_2 + zero, l: zero }.angle();
         (self.half_turns, within.bounded(T::half() * T::PI))
     }
 

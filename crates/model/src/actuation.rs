@@ -102,16 +102,6 @@ pub fn misaligned_forces<T: Real>(gain: T, v: &ControlOutputs<T>, theta_error: T
 }
 
 impl<T: Real> ActuationGains<T> {
-    //= specs/equation-09.md#projection
-    //# Each channel MUST make its gain times the projection of both commands onto its axis.
-    //= specs/equation-09.md#half-a-turn-reverses-the-forces
-    //# Turning the orientation by 180° MUST reverse every force.
-    //= specs/equation-09.md#linear
-    //# Doubling the commands MUST double every force exactly.
-    //= specs/equation-09.md#energy-command
-    //# With equal gains the energy command MUST change the energy only, and take it out where the command is positive.
-    //= specs/equation-09.md#quadrature-command
-    //# With equal gains the quadrature command MUST change the quadrature only, and add to it where the command is positive.
     /// **Equation 9**, the forces along X and Y when the commands are projected at `theta` (rad):
     ///
     /// $$f_{xc} = -G_{Ax} v_{qc}\sin\theta,\quad f_{xs} = G_{Ax} v_{as}\cos\theta,$$
@@ -124,6 +114,16 @@ impl<T: Real> ActuationGains<T> {
         self.axis_forces_along(v, cos, sin)
     }
 
+    //= specs/equation-09.md#projection
+    //# Each channel MUST make its gain times the projection of both commands onto its axis.
+    //= specs/equation-09.md#half-a-turn-reverses-the-forces
+    //# Turning the orientation by 180° MUST reverse every force.
+    //= specs/equation-09.md#linear
+    //# Doubling the commands MUST double every force exactly.
+    //= specs/equation-09.md#energy-command
+    //# With equal gains the energy command MUST change the energy only, and take it out where the command is positive.
+    //= specs/equation-09.md#quadrature-command
+    //# With equal gains the quadrature command MUST change the quadrature only, and add to it where the command is positive.
     /// [`ActuationGains::axis_forces`] where the cosine and the sine of θ are known.
     #[inline]
     pub fn axis_forces_along(&self, v: &ControlOutputs<T>, cos: T, sin: T) -> AxisForces<T> {

@@ -357,3 +357,23 @@ fn inverses_have_the_form_that_is_told_of_them() {
         assert_eq!(form, expected, "{id}");
     }
 }
+
+#[test]
+fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
+    let readout: Vec<_> =
+        EffectId::ALL.iter().map(|id| id.description()).filter(|d| d.stage == Stage::Readout).map(|d| d.id).collect();
+    // what is added to the angle of the vibration, then plates, axes, amplifier, and the converter
+    let angle = ["harmonic-n", "time-periodic", "angle-latency"];
+    let channels = [
+        "detection-cubic",
+        "detection-skew",
+        "detection-gain-mismatch",
+        "gain-drift",
+        "detection-offset",
+        "detection-saturation",
+    ];
+    assert_eq!(readout, [&angle[..], &channels].concat());
+    for &id in EffectId::ALL {
+        assert_eq!(id.acts_on_angle(), angle.contains(&id.description().id), "{id}");
+    }
+}

@@ -5,6 +5,7 @@
 //! left. Nothing passes by being named.
 
 mod claims;
+mod flight;
 mod gate;
 mod page;
 mod record;

@@ -5,6 +5,7 @@
 
 use core::hint::black_box;
 
+use cvg_calibrator::{Calibrator, Commands, Health};
 use cvg_controller::supervisor::{Beat as Heard, Observation};
 use cvg_controller::{
     Allocation, Heading, OrbitCommands, Pi, PiState, RateLoop, Supervisor, SupervisorState,
@@ -16,7 +17,7 @@ use cvg_estimator::{
 };
 use cvg_instrument::{Instrument, Settings, State, Status};
 use cvg_model::effects::Moment;
-use cvg_model::{Envelope, Float, Pendulum};
+use cvg_model::{AxisForces, Envelope, Float, Pendulum};
 use no_panic::no_panic;
 
 macro_rules! steps {
@@ -91,6 +92,21 @@ macro_rules! steps {
                 matches!(c.step(s, o, b), cvg_controller::Orders::Rest)
             }
 
+            #[no_panic]
+            #[inline(never)]
+            pub fn calibrator(c: &Calibrator<T>, s: &mut cvg_calibrator::State<T>, e: &Envelope<T>, v: &Commands<T>) -> T {
+                let e = c.readout(s, e);
+                let f = c.forward(s, e.x_c, e.y_c, e.x_c);
+                c.step(s, &e.pendulum(), (e.x_c, e.y_c), v, Health::Operating);
+                let axes = c.drives(s, &AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s });
+                c.status(s).bias_rad + f.quadrature_v + axes.x_c
+            }
+            #[no_panic]
+            #[inline(never)]
+            pub fn record(c: &Calibrator<T>, s: &cvg_calibrator::State<T>) -> bool {
+                c.restore(&c.save(s)).is_ok()
+            }
+
             pub fn all(v: f64) -> Result<f64, Box<dyn core::error::Error>> {
                 let t = <T as Float>::from_f64(v);
                 let settings = black_box(Settings::default());
@@ -146,6 +162,13 @@ macro_rules! steps {
                 let watch = black_box(Supervisor::<T>::new(&supervisor_settings)?);
                 let mut watched = black_box(SupervisorState::default());
                 sum += f64::from(u8::from(supervisor(&watch, &mut watched, &observation, None)));
+                let learns = black_box(Calibrator::<T>::new(&cvg_calibrator::Settings::default())?);
+                let mut learned = black_box(learns.start());
+                let asked = Commands { energy_v: t, precession_v: t, quadrature_v: t };
+                for _ in 0..200 {
+                    sum += f64::from(calibrator(&learns, &mut learned, &e, &asked));
+                }
+                sum += f64::from(u8::from(record(&learns, &learned)));
                 Ok(sum)
             }
         }

@@ -20,7 +20,7 @@ impl Dice {
 
     /// Rare: once in eight.
     fn rarely(&mut self) -> bool {
-        self.roll() % 8 == 0
+        self.roll().is_multiple_of(8)
     }
 }
 
@@ -427,8 +427,8 @@ fn a_walk_of_any_windows_is_that_of_the_table() {
         let mut table = Table { s: state };
         let calm = dice.of(&[0, 3, 30]);
         for k in 0..1000 {
-            let o = if dice.roll() % (calm + 1) == 0 { any_window(&mut dice) } else { well() };
-            if dice.roll() % 100 == 0 {
+            let o = if dice.roll().is_multiple_of(calm + 1) { any_window(&mut dice) } else { well() };
+            if dice.roll().is_multiple_of(100) {
                 let wish = dice.of(&[Wish::WholeAngle, Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]);
                 (state.wish, table.s.wish) = (wish, wish);
             }

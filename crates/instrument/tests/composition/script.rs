@@ -16,6 +16,8 @@ pub(super) enum Event {
     Once(usize, f64),
     Wish(Wish),
     Acknowledge,
+    /// the precession that is known is all but none
+    Stalled,
     /// from now on, in set amplitudes
     Amplitude(f64),
     /// from now on, rad/s
@@ -34,7 +36,7 @@ impl Event {
     pub(super) fn windows(&self) -> u32 {
         match *self {
             Self::Well(n) | Self::Silent(n) | Self::Constant(_, _, n) => n,
-            Self::Wish(_) | Self::Acknowledge => 0,
+            Self::Wish(_) | Self::Acknowledge | Self::Stalled => 0,
             Self::Once(..) => 1,
             _ => 3,
         }
@@ -66,6 +68,7 @@ pub(super) fn event() -> impl Strategy<Value = Event> {
         2 => (0_usize..2, value).prop_map(|(c, v)| Event::Once(c, v)),
         2 => wish.prop_map(Event::Wish),
         1 => Just(Event::Acknowledge),
+        1 => Just(Event::Stalled),
         2 => prop::sample::select(vec![0.001, 0.4, 0.5, 0.9, 1.0, 1.0, 1.1, 1.4, 1.6]).prop_map(Event::Amplitude),
         2 => (-40.0..40.0).prop_map(Event::Rate),
         1 => (-1.6..1.6).prop_map(Event::Jump),
@@ -119,7 +122,7 @@ impl Vibration {
             Event::Phase(by) => self.phase += by,
             Event::Round(q) => self.round = q,
             Event::Detuned(hz) => self.detuned_hz = hz,
-            Event::Well(_) | Event::Wish(_) | Event::Acknowledge => {}
+            Event::Well(_) | Event::Wish(_) | Event::Acknowledge | Event::Stalled => {}
         }
     }
 

@@ -13,7 +13,8 @@ fn an_effect_of_a_recordings_clock_is_refused_and_every_other_of_the_readout_is_
         if id == EffectId::TimePeriodic {
             values = [50.0, 1e-3, 0.0, 0.0];
         }
-        let effects = [(id, values)];
+        // also behind one that is taken
+        let effects = [(EffectId::DetectionSkew, [0.01, 0.0, 0.0, 0.0]), (id, values)];
         match Instrument::<f32>::new(&Settings { readout: &effects, ..Settings::default() }) {
             Ok(_) => assert!(!id.in_time(), "{id:?}"),
             Err(e) => {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::flight;
 use crate::prove;
 use crate::source::{self, Function};
 
@@ -27,6 +28,17 @@ pub(crate) struct Requirement {
     pub(crate) domain: String,
     /// what is not proved, and why
     pub(crate) not_proved: Option<String>,
+    /// functions that have to meet it and that nobody calls in the instrument, in backticks, and why
+    pub(crate) not_flown: Option<String>,
+}
+
+/// A function that has to meet a requirement.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Meets {
+    pub(crate) name: String,
+    pub(crate) place: String,
+    /// who calls it, from what the firmware calls; none where nobody does
+    pub(crate) called: Option<Vec<String>>,
 }
 
 /// How the runner calls a test.
@@ -63,7 +75,7 @@ pub(crate) struct Named {
     pub(crate) tests: Vec<Test>,
     pub(crate) harnesses: Vec<Harness>,
     /// the functions that have to meet each requirement
-    pub(crate) functions: BTreeMap<String, Vec<String>>,
+    pub(crate) functions: BTreeMap<String, Vec<Meets>>,
     /// the test files in which some test cites a requirement
     pub(crate) files: Vec<String>,
 }
@@ -91,15 +103,19 @@ pub(crate) fn read(repository: &Path) -> Result<Named, String> {
         }
     }
     let evidence = |path: &Path| path.components().any(|c| c.as_os_str().to_string_lossy().starts_with("proof"));
+    let calls = flight::calls(repository)?;
     for file in source::rust_files(&repository.join("crates")) {
         if evidence(&file) || file.starts_with(repository.join("crates/xtask")) {
             continue;
         }
         let place = file.strip_prefix(repository).unwrap_or(&file).display().to_string();
-        for function in source::read(repository, &file)? {
+        let text = text(&file)?;
+        for function in source::functions(Path::new(&place), &text) {
+            let name = flight::in_full(&text, &function);
             for citation in &function.citations {
                 let functions = named.functions.entry(citation.target.clone()).or_default();
-                functions.push(format!("{} ({place})", function.name));
+                let called = calls.get(&(name.clone(), place.clone())).cloned();
+                functions.push(Meets { name: name.clone(), place: place.clone(), called });
             }
         }
     }
@@ -133,6 +149,8 @@ fn chapter(name: &str, text: &str) -> Result<Chapter, String> {
     let mut sections = text.split("\n## ");
     let head = sections.next().unwrap_or_default();
     let line = |body: &str, label: &str| body.lines().find_map(|l| l.strip_prefix(label).map(str::to_owned));
+    // of the whole chapter, unless a requirement says more
+    let of_all = line(head, "Not in the instrument: ");
     let mut requirements = Vec::new();
     for section in sections {
         let (heading, body) = section.split_once('\n').ok_or_else(|| format!("{name}: {section} is empty"))?;
@@ -142,6 +160,7 @@ fn chapter(name: &str, text: &str) -> Result<Chapter, String> {
             text: sentence.ok_or_else(|| format!("{name}: {heading} requires nothing"))?.to_owned(),
             domain: line(body, "Domain: ").ok_or_else(|| format!("{name}: {heading} has no domain"))?,
             not_proved: line(body, "Not proved: "),
+            not_flown: line(body, "Not in the instrument: ").or_else(|| of_all.clone()),
         });
     }
     Ok(Chapter {
@@ -216,7 +235,7 @@ mod tests {
     #[test]
     fn a_chapter_has_its_requirements_with_their_domains_and_reasons() {
         let text = "# Equation 5: a product\n\nNo bit-precise proof: none is needed.\n\n## Zero is kept\n\nIt MUST be zero.\n\n\
-            Domain: all of it.\n\nNot proved: it is obvious.\n\n## Sign\n\nIt MUST stay.\n\nDomain: half.\n";
+            Domain: all of it.\n\nNot proved: it is obvious.\n\n## Sign\n\nIt MUST stay.\n\nDomain: half.\n\nNot in the instrument: `f`: so.\n";
         let found = chapter("equation-05", text).expect("well-formed");
         assert_eq!((found.number, found.title.as_str()), (Some(5), "Equation 5: a product"));
         assert_eq!(found.without_bits.as_deref(), Some("none is needed."));
@@ -224,6 +243,11 @@ mod tests {
         assert_eq!((zero.id.as_str(), zero.text.as_str()), ("specs/equation-05.md#zero-is-kept", "It MUST be zero."));
         assert_eq!((zero.domain.as_str(), zero.not_proved.as_deref()), ("all of it.", Some("it is obvious.")));
         assert_eq!((sign.domain.as_str(), sign.not_proved.as_deref()), ("half.", None));
+        assert_eq!((zero.not_flown.as_deref(), sign.not_flown.as_deref()), (None, Some("`f`: so.")));
+        let whole =
+            format!("# A\n\nNot in the instrument: `g`.\n\n## B{}", text.split_once("## Sign").expect("there").1);
+        let of_all = chapter("dsp", &whole.replace("Not in the instrument: `f`: so.\n", "")).expect("well-formed");
+        assert_eq!(of_all.requirements[0].not_flown.as_deref(), Some("`g`."));
         assert!(chapter("dsp", "# A\n\n## B\n\nIt MUST be.\n").is_err(), "no domain");
         assert!(chapter("dsp", "# A\n\n## B\n\nDomain: all.\n").is_err(), "no requirement");
     }

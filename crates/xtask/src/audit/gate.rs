@@ -1,5 +1,7 @@
 //! What makes an audit fail.
 
+use std::collections::BTreeSet;
+
 use super::claims::{Chapter, Named};
 use super::record::{Judged, Kind, Record, Results, Status, Twin};
 use super::runners::ENGINES;
@@ -50,6 +52,7 @@ pub(crate) fn faults(record: &Record, named: &Named, results: &Results) -> Vec<S
         for judged in all {
             found.extend(requirement(judged));
         }
+        found.extend(flown(chapter, all));
         found.extend(equation(chapter, all));
     }
     for n in EQUATIONS {
@@ -79,10 +82,27 @@ fn requirement(judged: &Judged) -> Vec<String> {
     if judged.functions.is_empty() {
         found.push(format!("{id}: no function has to meet it"));
     }
+    let excused = judged.requirement.not_flown.as_deref().unwrap_or_default();
+    for f in judged.functions.iter().filter(|f| f.called.is_none()) {
+        if !excused.contains(&format!("`{}`", f.name)) {
+            found.push(format!("{id}: nobody calls {} ({}) in the instrument, and no word on why", f.name, f.place));
+        }
+    }
     if !judged.evidence.iter().any(|e| e.kind.is_proof()) && judged.requirement.not_proved.is_none() {
         found.push(format!("{id}: not proved, and no word on why"));
     }
     found
+}
+
+/// Functions that a chapter says are not called in the instrument, and are, or are not there.
+fn flown(chapter: &Chapter, all: &[Judged]) -> Vec<String> {
+    let reasons: BTreeSet<&str> = all.iter().filter_map(|j| j.requirement.not_flown.as_deref()).collect();
+    let names = reasons.iter().flat_map(|r| r.split('`').skip(1).step_by(2));
+    let flies = |name: &str| {
+        let mut of_it = all.iter().flat_map(|j| &j.functions).filter(|f| f.name == name).peekable();
+        of_it.peek().is_none() || of_it.any(|f| f.called.is_some())
+    };
+    names.filter(|n| flies(n)).map(|n| format!("{}: {n} is called, or does not exist", chapter.title)).collect()
 }
 
 /// What an equation has to have.
@@ -111,7 +131,7 @@ fn equation(chapter: &Chapter, all: &[Judged]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::claims::{Chapter, Harness, Named, Names, Requirement, Test};
+    use super::super::claims::{Chapter, Harness, Meets, Named, Names, Requirement, Test};
     use super::super::record::{Proof, Record, Results, Status};
     use super::super::runners::ENGINES;
     use super::{EQUATIONS, faults};
@@ -133,13 +153,23 @@ mod tests {
         }
     }
 
+    fn meets(name: &str, called: bool) -> Meets {
+        let chain = called.then(|| vec!["Instrument::step".to_owned(), name.to_owned()]);
+        Meets { name: name.into(), place: "a.rs".into(), called: chain }
+    }
+
     /// Eleven equations with all that is asked of them, everything passed.
     fn sound() -> (Named, Results) {
         let (mut named, mut results) = (Named::default(), Results::default());
         for n in EQUATIONS {
             let id = format!("specs/equation-{n:02}.md#a");
-            let requirement =
-                Requirement { id: id.clone(), text: "It MUST be.".into(), domain: "all".into(), not_proved: None };
+            let requirement = Requirement {
+                id: id.clone(),
+                text: "It MUST be.".into(),
+                domain: "all".into(),
+                not_proved: None,
+                not_flown: None,
+            };
             named.chapters.push(Chapter {
                 number: Some(n),
                 title: format!("Equation {n}"),
@@ -150,7 +180,7 @@ mod tests {
             named.tests.extend(tests.chain(["interval_d", "interval_d_twin"].map(|name| test(n, name, true))));
             let name = format!("proof_{n}");
             named.harnesses.push(Harness { name: name.clone(), requirements: vec![id.clone()] });
-            named.functions.insert(id, vec!["f".into()]);
+            named.functions.insert(id, vec![meets("f", true)]);
             results.proofs.push(Proof {
                 name,
                 claim: String::new(),
@@ -258,8 +288,8 @@ mod tests {
         let unproved = |n: &mut Named, why: Option<&str>| {
             let id = "specs/equation-02.md#b";
             let (text, domain, not_proved) = ("It MUST be.".into(), "all".into(), why.map(str::to_owned));
-            n.chapters[1].requirements.push(Requirement { id: id.into(), text, domain, not_proved });
-            n.functions.insert(id.into(), vec!["f".into()]);
+            n.chapters[1].requirements.push(Requirement { id: id.into(), text, domain, not_proved, not_flown: None });
+            n.functions.insert(id.into(), vec![meets("f", true)]);
             let a = n.tests.iter_mut().find(|t| t.file == "equation_02").expect("a test");
             a.function.citations.push(Citation { target: id.into(), quote: String::new() });
         };
@@ -269,5 +299,20 @@ mod tests {
         assert!(planted(|n, _| n.functions.clear()).contains("no function has to meet it"));
         assert!(planted(|n, _| n.harnesses[0].requirements.push("specs/x.md#y".into())).contains("does not exist"));
         assert!(planted(|n, _| drop(n.chapters.remove(10))).contains("Equation 11 has no requirements"));
+    }
+    #[test]
+    fn what_nobody_calls_in_the_instrument_fails_it_unless_the_chapter_says_why() {
+        let of = |called: bool, why: Option<&'static str>| {
+            planted(|n, _| {
+                let all = n.functions.get_mut("specs/equation-03.md#a").expect("3");
+                all.push(meets("g", called));
+                n.chapters[2].requirements[0].not_flown = why.map(str::to_owned);
+            })
+        };
+        assert_eq!((of(true, None), of(false, Some("`g`: the device does it."))), (String::new(), String::new()));
+        let uncalled = "equation-03.md#a: nobody calls g (a.rs) in the instrument, and no word on why";
+        assert!(of(false, None).contains(uncalled) && of(false, Some("`h`: so.")).contains(uncalled));
+        assert!(of(true, Some("`g`: so.")).contains("Equation 3: g is called, or does not exist"));
+        assert!(of(true, Some("`h`: so.")).contains("Equation 3: h is called, or does not exist"));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::claims::Meets;
 use super::record::{Evidence, Judged, Record, Results, Status, Twin};
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;max-width:75rem;margin:2rem auto;padding:0 1rem;color:#222}\
@@ -62,8 +63,11 @@ fn requirement(page: &mut String, judged: &Judged) {
         escaped(&r.id),
         escaped(&r.text),
         escaped(&r.domain),
-        escaped(&judged.functions.join(", "))
+        judged.functions.iter().map(function).collect::<Vec<_>>().join("<br>")
     );
+    if let Some(reason) = &r.not_flown {
+        let _ = write!(page, "<p class=\"note\">Not in the instrument: {}</p>", escaped(reason));
+    }
     let proved = judged.evidence.iter().any(|e| e.kind.is_proof());
     if let Some(reason) = &r.not_proved {
         let label = if proved { "Not proved beyond what stands below" } else { "Not proved" };
@@ -75,6 +79,14 @@ fn requirement(page: &mut String, judged: &Judged) {
         evidence(page, e);
     }
     *page += "</table>";
+}
+
+/// A function, and who calls it in the instrument.
+fn function(f: &Meets) -> String {
+    let caller = f.called.as_ref().map_or("not called in the instrument".to_owned(), |chain| {
+        if chain.len() > 1 { format!("called by {}", chain.join(" → ")) } else { "called by the firmware".to_owned() }
+    });
+    format!("{} ({}), {}", escaped(&f.name), escaped(&f.place), escaped(&caller))
 }
 
 fn evidence(page: &mut String, e: &Evidence) {

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::claims::{Chapter, Named, Names, Requirement, Test};
+use super::claims::{Chapter, Meets, Named, Names, Requirement, Test};
 use super::runners::Tests;
 
 /// What a runner said of a test or a proof.
@@ -142,7 +142,7 @@ pub(crate) struct Evidence {
 #[derive(Clone, Debug)]
 pub(crate) struct Judged {
     pub(crate) requirement: Requirement,
-    pub(crate) functions: Vec<String>,
+    pub(crate) functions: Vec<Meets>,
     pub(crate) evidence: Vec<Evidence>,
 }
 
@@ -178,9 +178,11 @@ impl Record {
     /// `audit.json`: the equations.
     pub(crate) fn json(&self) -> Value {
         let evidence = |e: &Evidence| json!({"kind": e.kind, "name": e.name, "status": e.status, "twin": e.twin});
+        let function = |f: &Meets| json!({"name": f.name, "file": f.place, "called": f.called});
         let requirement = |j: &Judged| {
             let all: Vec<_> = j.evidence.iter().map(evidence).collect();
-            json!({"id": j.requirement.id, "text": j.requirement.text, "evidence": all})
+            let functions: Vec<_> = j.functions.iter().map(function).collect();
+            json!({"id": j.requirement.id, "text": j.requirement.text, "functions": functions, "evidence": all})
         };
         let equations: Vec<_> = self
             .chapters

@@ -50,8 +50,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the other spelling of zero is the other side of the cut",
         "estimator/src/precession.rs",
-        "(self.sin_2 + T::zero()).atan2",
-        "self.sin_2.atan2",
+        "s: self.sin_2 + zero, l: zero",
+        "s: self.sin_2, l: zero",
         PRECESSION,
     ),
     fault(

@@ -3,6 +3,7 @@
 use super::{Fault, fault};
 
 const OPEN_LOOP: (&str, &str) = ("cvg-instrument", "open_loop");
+const JOINED: (&str, &str) = ("cvg-instrument", "composition");
 const SHORT_WAY: (&str, &str) = ("cvg-instrument", "--lib");
 
 const STEP: &str = "instrument/src/step.rs";
@@ -35,7 +36,7 @@ pub(super) const FAULTS: &[Fault] = &[
         STEP,
         "(state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);",
         "(state.energy, state.quadrature, state.precession) = (energy, quadrature, precession);\n        let _ = lock;",
-        OPEN_LOOP,
+        JOINED,
     ),
     fault(
         "the delay is undone backwards in one drive",
@@ -49,7 +50,7 @@ pub(super) const FAULTS: &[Fault] = &[
         STEP,
         "let more = correction_rad_s * self.delay_s;",
         "let more = T::zero() * correction_rad_s * self.delay_s;",
-        OPEN_LOOP,
+        JOINED,
     ),
     fault(
         "the second output has no limit",
@@ -72,14 +73,7 @@ pub(super) const FAULTS: &[Fault] = &[
         "        state.phasor = phasor;",
         OPEN_LOOP,
     ),
-    fault(
-        "a compensation without an answer is a measurement",
-        STEP,
-        "let valid = !spoilt && pendulum.e.is_finite();",
-        "let valid = !spoilt;",
-        OPEN_LOOP,
-    ),
-    fault("a pattern that jumps has moved", STEP, "jumped: moved == Movement::Jumped }", "jumped: false }", OPEN_LOOP),
+    fault("a pattern that jumps has moved", STEP, "jumped: moved == Movement::Jumped }", "jumped: false }", JOINED),
     fault(
         "the short way takes back that half turns may be lost",
         STEP,
@@ -99,7 +93,7 @@ pub(super) const FAULTS: &[Fault] = &[
         STEP,
         "let then = self.precession.ahead(&precession, &now);",
         "let then = now;",
-        OPEN_LOOP,
+        JOINED,
     ),
     fault(
         "a hold takes the free pattern's way",
@@ -155,7 +149,7 @@ pub(super) const FAULTS: &[Fault] = &[
         "instrument/src/settings.rs",
         "let hold_s = 0.5 * window_s;",
         "let hold_s = 0.0 * window_s;",
-        OPEN_LOOP,
+        JOINED,
     ),
     fault(
         "what a recording's clock told is compensated",

@@ -1,0 +1,197 @@
+//! Who calls a function in the instrument: what nobody calls there does not fly, whatever is proved of it.
+//!
+//! It reads names, as `source` does: a function is called by another if its name stands in the other's body and the type
+//! that it belongs to in the other's file (in the instrument and in the calibrator: in the crate).
+
+use std::collections::{BTreeMap, VecDeque};
+use std::fs;
+use std::path::Path;
+
+use crate::source::{self, Function};
+
+/// What runs in firmware, and where the calls of those who use it begin.
+const CRATES: [(&str, bool); 5] =
+    [("model", false), ("estimator", false), ("controller", false), ("instrument", true), ("calibrator", true)];
+
+/// Function, file: who calls it, from the one that the firmware calls.
+pub(crate) type Calls = BTreeMap<(String, String), Vec<String>>;
+
+#[derive(Debug)]
+struct Node {
+    function: Function,
+    /// the type or trait in whose block it stands
+    owner: Option<String>,
+    /// all that its calls may mean
+    scope: usize,
+    begins: bool,
+}
+
+/// What the public functions of the instrument and of the calibrator call, directly or not.
+pub(crate) fn calls(repository: &Path) -> Result<Calls, String> {
+    let (mut nodes, mut scopes) = (Vec::new(), Vec::<String>::new());
+    for (name, begins) in CRATES {
+        let folder = repository.join("crates").join(name).join("src");
+        let first = scopes.len();
+        for file in source::rust_files(&folder) {
+            let relative = file.strip_prefix(&folder).unwrap_or(&file).display().to_string();
+            if relative.contains("tests") || relative.starts_with("proofs") {
+                continue;
+            }
+            let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+            if begins && scopes.len() > first {
+                scopes[first].push_str(&code(&text));
+            } else {
+                scopes.push(code(&text));
+            }
+            let place = file.strip_prefix(repository).unwrap_or(&file);
+            nodes.extend(functions(place, &text, scopes.len() - 1, begins));
+        }
+    }
+    Ok(reached(&nodes, &scopes))
+}
+
+/// The text without its comments.
+fn code(text: &str) -> String {
+    text.lines().filter(|l| !l.trim_start().starts_with("//")).map(|l| format!("{l}\n")).collect()
+}
+
+fn functions(place: &Path, text: &str, scope: usize, begins: bool) -> Vec<Node> {
+    let lines: Vec<&str> = text.lines().collect();
+    let public = |f: &Function| lines.get(f.line - 1).is_some_and(|l| l.trim_start().starts_with("pub fn "));
+    let all = source::functions(place, text).into_iter();
+    all.map(|function| Node {
+        owner: owner(&lines, function.line),
+        scope,
+        begins: begins && public(&function),
+        function: Function { body: code(&function.body), ..function },
+    })
+    .collect()
+}
+
+/// The type of the `impl`, or the `trait`, in which line `line` (from 1) stands.
+fn owner(lines: &[&str], line: usize) -> Option<String> {
+    let inner = lines.get(line - 1)?.starts_with(' ');
+    let opens = |l: &&&str| !l.starts_with([' ', '/', '#', '}']) && l.ends_with('{');
+    let head = lines.iter().take(line - 1).rev().find(opens).filter(|_| inner)?;
+    let head = head.strip_prefix("pub ").unwrap_or(head);
+    let named = if let Some(rest) = head.strip_prefix("trait ") {
+        rest
+    } else {
+        let rest = head.strip_prefix("impl")?;
+        let rest = rest.rsplit_once(" for ").map_or(rest, |(_, after)| after);
+        // what follows the parameters
+        let rest = if rest.starts_with('<') { rest.split_once("> ").map_or(rest, |(_, after)| after) } else { rest };
+        rest.trim_start()
+    };
+    words(named).next().map(str::to_owned)
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
+}
+
+fn reached(nodes: &[Node], scopes: &[String]) -> Calls {
+    let mut found = Calls::new();
+    let mut chains: Vec<Option<Vec<String>>> = vec![None; nodes.len()];
+    let mut waiting: VecDeque<usize> = (0..nodes.len()).filter(|k| nodes[*k].begins).collect();
+    for k in &waiting {
+        chains[*k] = Some(vec![called(&nodes[*k])]);
+    }
+    let known: Vec<std::collections::BTreeSet<&str>> = scopes.iter().map(|s| words(s).collect()).collect();
+    while let Some(k) = waiting.pop_front() {
+        let chain = chains[k].clone().unwrap_or_default();
+        let caller = &nodes[k];
+        // beyond its first line, which has its own name
+        let body = caller.function.body.split_once('{').map_or("", |(_, body)| body);
+        let said: std::collections::BTreeSet<&str> = words(body).collect();
+        for (j, node) in nodes.iter().enumerate() {
+            let of_its_type = node.owner.as_ref().is_none_or(|o| {
+                caller.owner.as_ref() == Some(o) && caller.scope == node.scope
+                    || known[caller.scope].contains(o.as_str())
+            });
+            if chains[j].is_none() && said.contains(node.function.name.as_str()) && of_its_type {
+                let mut longer = chain.clone();
+                longer.push(called(node));
+                chains[j] = Some(longer);
+                waiting.push_back(j);
+            }
+        }
+    }
+    for (node, chain) in nodes.iter().zip(chains) {
+        if let Some(chain) = chain {
+            let key = (called(node), node.function.file.display().to_string());
+            found.entry(key).or_insert(chain);
+        }
+    }
+    found
+}
+
+fn called(node: &Node) -> String {
+    qualified(node.owner.as_deref(), &node.function.name)
+}
+
+/// As people write it.
+fn qualified(owner: Option<&str>, name: &str) -> String {
+    owner.map_or(name.to_owned(), |o| format!("{o}::{name}"))
+}
+
+/// The function that `text` has, with its type.
+pub(crate) fn in_full(text: &str, function: &Function) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    qualified(owner(&lines, function.line).as_deref(), &function.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{calls, code, functions, owner, reached};
+    use std::path::Path;
+
+    #[test]
+    fn a_method_belongs_to_the_type_of_its_block() {
+        let text = "impl<T: Float> Fast<T> {\n    pub fn step(&self) {\n    }\n}\n\nimpl core::fmt::Display for Odd {\n    \
+            fn fmt(&self) {\n    }\n}\n\npub trait Rare: Real {\n    fn rate(&self) {\n    }\n}\n\nfn free() {\n}\n";
+        let lines: Vec<&str> = text.lines().collect();
+        let of = |line| owner(&lines, line);
+        assert_eq!((of(2).as_deref(), of(7).as_deref()), (Some("Fast"), Some("Odd")));
+        assert_eq!((of(12).as_deref(), of(16)), (Some("Rare"), None));
+    }
+
+    #[test]
+    fn what_is_called_is_reached_and_what_has_the_name_of_it_alone_is_not() {
+        let text = "impl<T> Whole<T> {\n    pub fn step(&self) {\n        self.part.step_part();\n        // lost();\n    }\n}\n\n\
+            impl<T> Part<T> {\n    fn step_part(&self) {\n        inner();\n    }\n}\n\nfn inner() {\n}\n\nfn lost() {\n}\n";
+        let other = "impl<T> Other<T> {\n    fn step_part(&self) {\n    }\n}\n";
+        let mut nodes = functions(Path::new("a.rs"), text, 0, true);
+        nodes.extend(functions(Path::new("b.rs"), other, 1, false));
+        let found = reached(&nodes, &[code(text), code(other)]);
+        let chain = |name: &str, file: &str| found.get(&(name.to_owned(), file.to_owned())).cloned();
+        assert_eq!(chain("inner", "a.rs"), Some(vec!["Whole::step".into(), "Part::step_part".into(), "inner".into()]));
+        assert_eq!(chain("lost", "a.rs"), None);
+        assert_eq!(chain("Other::step_part", "b.rs"), None);
+    }
+
+    #[test]
+    fn every_requirement_is_on_what_flies_or_says_why_not() {
+        let repository = crate::repository();
+        let named = super::super::claims::read(&repository).expect("readable");
+        let record = super::super::record::Record::assemble(&named, &super::super::record::Results::default());
+        let found = super::super::gate::faults(&record, &named, &super::super::record::Results::default());
+        let flight: Vec<_> =
+            found.iter().filter(|f| f.contains("in the instrument") || f.contains("is called, or does")).collect();
+        assert!(flight.is_empty(), "{flight:#?}");
+    }
+
+    #[test]
+    fn the_instrument_tracks_its_pattern_by_precession_and_not_by_the_angle() {
+        let found = calls(&crate::repository()).expect("readable");
+        let flies = |name: &str, file: &str| found.contains_key(&(name.to_owned(), format!("crates/{file}")));
+        assert!(flies("major_axis_of", "estimator/src/direction.rs"));
+        assert!(flies("Precession::step_otherwise", "estimator/src/precession.rs"));
+        assert!(flies("DetectionCubic::unread", "model/src/effects/detection_cubic.rs"));
+        assert!(
+            !flies("PatternAngle::step", "estimator/src/angle.rs")
+                && !flies("major_axis", "estimator/src/direction.rs")
+        );
+        assert!(!flies("measured_angle", "model/src/detection.rs"));
+    }
+}
