@@ -249,6 +249,8 @@ fn an_effect_scales_with_rate_and_amplitude_as_its_definition_does() {
     for &id in EffectId::ALL {
         let Description { stage, scaling, onsets, .. } = id.description();
         match stage {
+            // it turns no line: the quadrature that answers it does, with a split, as the mechanics turn it
+            Stage::Readout if id == EffectId::DetectionPhase => assert_eq!(scaling.rate, -1, "{id}"),
             // what moves the pattern has the longer to do so the slower it turns
             Stage::Mechanics | Stage::Actuation => assert_eq!(scaling.rate, -1, "{id}"),
             Stage::Readout if onsets.is_empty() => {
@@ -369,6 +371,7 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-skew",
         "detection-gain-mismatch",
         "gain-drift",
+        "detection-phase",
         "detection-offset",
         "detection-saturation",
     ];
@@ -376,4 +379,14 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
     for &id in EffectId::ALL {
         assert_eq!(id.acts_on_angle(), angle.contains(&id.description().id), "{id}");
     }
+}
+
+#[test]
+fn channels_of_unequal_lag_turn_their_phasors_apart_by_it() {
+    let phase: f64 = 0.3;
+    // X e^{iφ/2} and Y e^{−iφ/2} with X = x_c − i x_s
+    let turned = |c: f64, s: f64, by: f64| (c * by.cos() + s * by.sin(), s * by.cos() - c * by.sin());
+    let (x_c, x_s) = turned(VIBRATION.x_c, VIBRATION.x_s, 0.5 * phase);
+    let (y_c, y_s) = turned(VIBRATION.y_c, VIBRATION.y_s, -0.5 * phase);
+    reads(EffectId::DetectionPhase, [phase, 0.0, 0.0, 0.0], Envelope::new(x_c, x_s, y_c, y_s), 1e-15);
 }

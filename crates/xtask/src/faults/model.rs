@@ -240,10 +240,10 @@ pub(super) const FAULTS: &[Fault] = &[
         SINGLE,
     ),
     fault(
-        "gains come after offsets",
+        "a phase comes after offsets",
         "model/src/effects/mod.rs",
-        "    GainDrift => gain_drift::GainDrift,\n    DetectionOffset => detection_offset::DetectionOffset,",
-        "    DetectionOffset => detection_offset::DetectionOffset,\n    GainDrift => gain_drift::GainDrift,",
+        "    DetectionPhase => detection_phase::DetectionPhase,\n    DetectionOffset => detection_offset::DetectionOffset,",
+        "    DetectionOffset => detection_offset::DetectionOffset,\n    DetectionPhase => detection_phase::DetectionPhase,",
         EFFECTS,
     ),
     fault(
