@@ -9,3 +9,4 @@ pub mod endings;
 pub mod pi;
 pub mod rate;
 pub mod supervisor;
+pub mod way_back;

@@ -211,7 +211,7 @@ pub struct SupervisorState {
 }
 
 /// Windows in a row that make a lock or a spin-up.
-const ENOUGH: u32 = 20;
+pub(crate) const ENOUGH: u32 = 20;
 /// Windows in a row in which a converter repeats itself to the last bit.
 const STUCK: u32 = 20;
 /// Short interruptions before they are a fault.

@@ -3,7 +3,7 @@
 use approx::assert_abs_diff_eq;
 use cvg_controller::{ActuationCompensation, Allocation, Heading, OrbitCommands, PiState, RateLoop, Status};
 use cvg_model::effects::EffectId;
-use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Orbit, Pendulum};
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float, Orbit, Pendulum};
 use proptest::prelude::*;
 
 const LIMIT_V: f64 = 5.0;
@@ -205,6 +205,67 @@ fn the_two_loops_alone_are_equation_9_through_the_compensation() {
         assert_eq!(plain().axes_within(&ControlOutputs { v_as: v, v_qc: 0.0 }, 0.6, 0.8), None, "{v}");
         assert_eq!(plain().axes_within(&ControlOutputs { v_as: 0.0, v_qc: v }, 0.6, 0.8), None, "{v}");
     }
+}
+
+/// Numbers at which something ends, of both signs.
+fn edges<T: Float>() -> Vec<T> {
+    let limit = LIMIT_V;
+    let all = [
+        0.0,
+        5e-324,
+        1e-45,
+        1e-39,
+        1e-20,
+        0.5,
+        0.6,
+        0.8,
+        1.0,
+        limit,
+        limit.next_up(),
+        limit.next_down(),
+        6.25,
+        1e30,
+        1e300,
+    ];
+    let more = [f64::INFINITY, f64::NAN, limit + 1e-6, limit - 1e-6];
+    all.into_iter().chain(more).flat_map(|v| [T::from_f64(v), T::from_f64(-v)]).collect()
+}
+
+/// The way of the two loops alone is that of all four commands where the other two are none: to the last bit, but for the sign
+/// of zero, and None where that is limited or invalid.
+fn the_short_way_is_the_whole_way<T: Float + Default>() {
+    let effects = [
+        (EffectId::ActuationGainMismatch, [1.3, 0.0, 0.0, 0.0].map(T::from_f64)),
+        (EffectId::ActuationSkew, [0.2, 0.0, 0.0, 0.0].map(T::from_f64)),
+    ];
+    let inverse = ActuationCompensation::new(&effects).expect("regular");
+    let edges = edges::<T>();
+    let mut within = 0;
+    for compensation in [None, Some(inverse)] {
+        let allocation = Allocation::new(compensation, T::from_f64(LIMIT_V)).expect("valid");
+        for &v_as in &edges {
+            for &v_qc in &edges {
+                for &cos in &edges {
+                    for &sin in &edges {
+                        let all = OrbitCommands { v_as, v_qc, ..OrbitCommands::default() };
+                        let whole = allocation.step(&all, cos, sin);
+                        let expected = (whole.status == Status::Within).then_some(whole.volts);
+                        let short = allocation.axes_within(&ControlOutputs { v_as, v_qc }, cos, sin);
+                        let same = short == expected && allocation.step_within(&all, cos, sin) == expected;
+                        assert!(same, "{v_as:?} {v_qc:?} {cos:?} {sin:?}: {short:?} and not {whole:?}");
+                        within += usize::from(short.is_some());
+                    }
+                }
+            }
+        }
+    }
+    assert!(within > 10_000, "{within}");
+}
+
+#[test]
+fn the_two_loops_alone_are_the_whole_way_at_every_edge() {
+    the_short_way_is_the_whole_way::<f32>();
+    the_short_way_is_the_whole_way::<f64>();
 }
 
 proptest! {
