@@ -92,6 +92,10 @@ fn a_drive_asked_for_too_much_is_limited_and_for_no_number_is_invalid() {
         (OrbitCommands { v_ac: f64::NAN, ..none }, 1.0, 0.5),
         (OrbitCommands { v_as: huge, v_ac: huge, ..none }, 0.0, 10.0),
         (OrbitCommands { v_as: huge, v_ac: huge, ..none }, 10.0, 0.0),
+        (OrbitCommands { v_as: huge, ..none }, 0.0, 10.0),
+        (OrbitCommands { v_as: huge, ..none }, 10.0, 0.0),
+        (OrbitCommands { v_ac: huge, ..none }, 0.0, 10.0),
+        (OrbitCommands { v_ac: huge, ..none }, 10.0, 0.0),
         (OrbitCommands { v_ac: huge, ..none }, 10.0, 10.0),
         (OrbitCommands { v_as: huge, ..none }, 10.0, 10.0),
     ] {

@@ -247,3 +247,18 @@ fn a_readout_that_is_no_number_is_none_afterwards() {
         }
     }
 }
+
+#[test]
+fn a_value_in_a_place_that_no_parameter_uses_is_refused_whatever_its_sign() {
+    for id in readout_effects() {
+        let used = id.description().parameters.len();
+        for place in used..4 {
+            for value in [0.5, -0.5, 1e-300, -1e-300, f64::NAN] {
+                let mut values: Values<f64> = id.neutral();
+                values[place] = value;
+                let refused = Compensation::<f64, 4>::new(&[(id, values)]).map(|_| ()).map_err(|e| e.parameter);
+                assert_eq!(refused, Err(id.description().id), "{place}: {value}");
+            }
+        }
+    }
+}

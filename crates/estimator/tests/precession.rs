@@ -266,3 +266,14 @@ fn half_turns_are_counted_as_far_as_they_can_be() {
         assert_eq!(state.half_turns, half_turns);
     }
 }
+
+#[test]
+fn a_jump_leaves_the_rate_that_was_known() {
+    for sense in [1.0, -1.0] {
+        let mut state = followed([0.3, 0.3 + sense * 0.05]).0;
+        let known = state.sin_2_per_window;
+        assert_eq!(tracker().step(&mut state, &line(0.3 + sense * 0.75)), Movement::Jumped);
+        assert_eq!(state.sin_2_per_window, known);
+        assert_abs_diff_eq!(state.degrees(), (0.3 + sense * 0.75_f64).to_degrees(), epsilon = 1e-12);
+    }
+}

@@ -55,13 +55,13 @@ enum Ending {
     Missed,
 }
 
-/// Plants the faults whose name or file contains `only`; every `nth` of them, from the first.
-pub(crate) fn run(only: Option<&str>, nth: usize) -> crate::Outcome {
+/// Plants the faults whose name or file contains one of `only`, all where there is none; every `nth` of them, from the first.
+pub(crate) fn run(only: &[&str], nth: usize) -> crate::Outcome {
     let started = Instant::now();
     let all = library();
     let chosen: Vec<Fault> = all
         .iter()
-        .filter(|f| only.is_none_or(|text| f.name.contains(text) || f.file.contains(text)))
+        .filter(|f| only.is_empty() || only.iter().any(|text| f.name.contains(text) || f.file.contains(text)))
         .step_by(nth.max(1))
         .copied()
         .collect();
