@@ -3,11 +3,13 @@
 //! Only presence is judged: whether the columns carry a rotation or a ring-down is the identification's to say.
 
 use super::Recording;
+use super::campaign::{Instrument, Reference};
 use super::channel::Channel;
 use super::error::ReadError;
 
 const ANGLE: &str = "`t_s` and one of (`xc_v` with `yc_v`, `theta_deg`)";
 const ROTATION: &str = "`t_s`, one of (`rate_dps`, `table_deg`) and one of (`xc_v` with `yc_v`, `theta_deg`)";
+const CHANNELS: &str = "`t_s`, `xc_v` and `yc_v`";
 const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`";
 
 /// Whether a set of channels holds the time and an angle: the least that makes a recording.
@@ -30,6 +32,20 @@ impl Recording {
         let has = |channel| self.channel(channel).is_some();
         let whole = holds_an_angle(has) && (has(Channel::Rate) || has(Channel::Table));
         self.require(whole, "a rotation", ROTATION)
+    }
+
+    /// Whether the columns are there that a turn of this instrument needs: those of a rotation, or of a sensor its two
+    /// channels alone, which need no reference to tell their own errors. Where the campaign says that there is no
+    /// reference, none is asked for.
+    pub(crate) fn require_turn(&self, instrument: Instrument, reference: Option<Reference>) -> Result<(), ReadError> {
+        let channels = self.xc_v.is_some() && self.yc_v.is_some();
+        if reference == Some(Reference::Absent) {
+            return self.require(channels, "a sensor without a reference", CHANNELS);
+        }
+        if instrument == Instrument::Sensor && channels {
+            return Ok(());
+        }
+        self.require_rotation()
     }
 
     /// Whether the columns of a ring-down are there: `t_s`, `xc_v`, `yc_v`, `vas_v`.

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cvg_recording::{Campaign, Instrument, Role, RunKind};
+use cvg_recording::{Campaign, Instrument, Naming, Reference, Role, RunKind};
 use tempfile::TempDir;
 
 const ROTATION: &str = "t_s,rate_dps,xc_v,yc_v\n0,500,1,0\n0.5,500,0.9,0.1\n1,500,0.8,0.2\n1.5,500,0.7,0.3\n";
@@ -137,7 +137,7 @@ fn values_out_of_range_are_refused_with_what_would_be_right() {
 #[test]
 fn a_kind_that_is_misspelt_or_missing_is_refused() {
     let text = headed("[[run]]\nkind = \"rotaton\"\nfile = \"rot.csv\"\n");
-    assert_refused(&text, &["line 4, column 8", "`kind` is \"rotaton\"", "\"rotation\" or \"ringdown\""]);
+    assert_refused(&text, &["line 4, column 8", "`kind` is \"rotaton\"", "\"rotation\" or \"ringdown\" or \"static\""]);
     assert_refused(&headed("[[run]]\nfile = \"rot.csv\"\n"), &["line 3", "this run has no `kind`"]);
     assert_refused(&headed("[[run]]\nkind = \"rotation\"\n"), &["line 3", "this run has no `file`"]);
 }
@@ -191,4 +191,64 @@ fn a_campaign_file_that_is_not_there_or_a_folder_is_refused() {
     assert!(message.ends_with("no.toml: there is no such file"), "{message}");
     let message = Campaign::open(folder.path()).unwrap_err().to_string();
     assert!(message.contains("is a directory; wanted a recording"), "{message}");
+}
+
+#[test]
+fn a_constant_rate_stands_in_for_the_column_that_a_file_lacks() {
+    let (folder, path) = campaign(&headed(&format!("{RUN}rate_dps = -0.00289\n")));
+    fs::write(folder.path().join("rot.csv"), "t_s,theta_deg\n0,1\n1,2\n2,3\n").unwrap();
+    let run = &Campaign::open(&path).unwrap().runs[0];
+    assert_eq!(run.recording.rate_dps.as_deref(), Some(&[-0.00289; 3][..]));
+}
+
+#[test]
+fn a_constant_rate_beside_a_column_is_not_used_and_said_so() {
+    let (_folder, path) = campaign(&headed(&format!("{RUN}rate_dps = 1\n")));
+    let campaign = Campaign::open(&path).unwrap();
+    assert_eq!(campaign.runs[0].recording.rate_dps.as_ref().unwrap()[0], 500.0);
+    assert!(campaign.warnings.iter().any(|w| w.contains("rot.csv: has rate_dps itself")), "{:?}", campaign.warnings);
+}
+
+#[test]
+fn a_sensor_needs_no_reference_and_a_gyroscope_does() {
+    let channels = "t_s,xc_v,yc_v\n0,1,0\n1,0,1\n2,-1,0\n";
+    for (head, opens) in [("instrument = \"sensor\"\n", true), ("reference = \"none\"\n", true), ("", false)] {
+        let (folder, path) = campaign(&headed(&format!("{head}{RUN}")));
+        fs::write(folder.path().join("rot.csv"), channels).unwrap();
+        assert_eq!(Campaign::open(&path).is_ok(), opens, "{head}");
+    }
+    let (folder, path) = campaign(&headed(&format!("instrument = \"sensor\"\n{RUN}")));
+    fs::write(folder.path().join("rot.csv"), "t_s,theta_deg\n0,1\n1,2\n").unwrap();
+    assert!(Campaign::open(&path).unwrap_err().to_string().contains("`rate_dps`, `table_deg`"));
+}
+
+#[test]
+fn an_instrument_known_from_elsewhere_stands_over_the_file() {
+    let (_folder, path) = campaign(&headed(RUN));
+    let opened = Campaign::open_as(&path, &Naming::default(), Some(Instrument::Sensor)).unwrap();
+    assert_eq!(opened.instrument, Instrument::Sensor);
+    let ringdown = "[[run]]\nkind = \"ringdown\"\nfile = \"ring.csv\"\nangle_deg = 0\nenergy_off_s = 1\n";
+    let (_folder, path) = campaign(&headed(&format!("{RUN}{ringdown}")));
+    let refused = Campaign::open_as(&path, &Naming::default(), Some(Instrument::Sensor)).unwrap_err().to_string();
+    assert!(refused.contains("a sensor has nothing that rings down"), "{refused}");
+}
+
+#[test]
+fn runs_at_rest_stand_alone_or_beside_others() {
+    let rest = "[[run]]\nkind = \"static\"\nfile = \"rot.csv\"\n";
+    let (_folder, path) = campaign(&headed(rest));
+    let opened = Campaign::open(&path).unwrap();
+    assert_eq!(opened.runs[0].kind, RunKind::Static);
+    assert!(opened.to_toml().contains("kind = \"static\""));
+    assert_refused(&headed(&format!("{rest}amplitude = 1\n")), &["`amplitude` has no meaning in a run at rest"]);
+}
+
+#[test]
+fn reference_and_temperature_are_read_and_written_again() {
+    let (_folder, path) = campaign(&headed(&format!("reference = \"commanded\"\ntemperature_c = 25\n{RUN}")));
+    let opened = Campaign::open(&path).unwrap();
+    assert_eq!((opened.reference, opened.temperature_c), (Some(Reference::Commanded), Some(25.0)));
+    assert!(opened.to_toml().contains("temperature_c = 25.0") && opened.to_toml().contains("\"commanded\""));
+    assert_refused(&headed(&format!("temperature_c = -300\n{RUN}")), &["`temperature_c` is -300"]);
+    assert_refused(&headed(&format!("reference = \"lost\"\n{RUN}")), &["\"measured\" or \"commanded\" or \"none\""]);
 }

@@ -9,6 +9,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{Instrument, Reference, Role, RunKind};
+use crate::Recording;
 use crate::error::ReadError;
 use crate::naming::Naming;
 
@@ -31,6 +32,8 @@ pub(super) struct Entry {
     pub(super) settle_s: f64,
     pub(super) role: Role,
     pub(super) amplitude: Option<f64>,
+    /// Constant input rate of a file that has no column for it, deg/s.
+    pub(super) rate_dps: Option<f64>,
 }
 
 /// What a campaign file says.
@@ -43,10 +46,40 @@ pub(super) struct Manifest {
     pub(super) period_deg: Option<f64>,
     pub(super) reference: Option<Reference>,
     pub(super) pole_pairs: Option<f64>,
+    pub(super) temperature_c: Option<f64>,
     /// What the recordings call their columns.
     pub(super) naming: Naming,
     pub(super) runs: Vec<Entry>,
     pub(super) warnings: Vec<String>,
+}
+
+/// The kinds of runs, before their settings are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Rotation,
+    Ringdown,
+    Static,
+}
+
+/// A refusal of a ring-down where there are no mechanics.
+pub(super) fn ringdown_of_a_sensor(path: &Path, at: Position) -> ReadError {
+    let what = "a sensor has nothing that rings down";
+    refuse(path, at, what.to_owned(), "rotation runs only, or `instrument = \"gyroscope\"`".to_owned())
+}
+
+impl Entry {
+    /// Gives a recording without a reference of its own the constant rate that the campaign file states; says so where it
+    /// has one and keeps it.
+    pub(super) fn constant_rate(&self, recording: &mut Recording) -> Option<String> {
+        let rate_dps = self.rate_dps?;
+        if recording.rate_dps.is_some() || recording.table_deg.is_some() {
+            let own = if recording.table_deg.is_some() { "table_deg" } else { "rate_dps" };
+            let file = self.file.display();
+            return Some(format!("{file}: has {own} itself; `rate_dps = {rate_dps}` of the campaign file is not used"));
+        }
+        recording.rate_dps = Some(vec![rate_dps; recording.len()]);
+        None
+    }
 }
 
 /// A refusal of something at a place of the file.
@@ -55,9 +88,13 @@ pub(super) fn refuse(path: &Path, at: Position, what: String, wanted: String) ->
 }
 
 const CAMPAIGN_KEYS: &[&str] =
-    &["device", "instrument", "carrier_hz", "angular_gain", "period_deg", "reference", "pole_pairs"];
-const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude"];
+    &["device", "instrument", "carrier_hz", "angular_gain", "period_deg", "reference", "pole_pairs", "temperature_c"];
+const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
+const STATIC_KEYS: &[&str] = &["kind", "file", "settle_s"];
 const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
+
+/// No temperature is below, °C.
+const ABSOLUTE_ZERO_C: f64 = -273.15;
 
 /// Understands a campaign file.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Manifest, ReadError> {
@@ -119,10 +156,13 @@ impl Text<'_> {
         let carrier_hz = self.number(head, "carrier_hz", "a positive number of Hz", |value| value > 0.0)?;
         let angular_gain = self.number(head, "angular_gain", "a number other than 0", |value| value != 0.0)?;
         let period_deg = self.number(head, "period_deg", "180 or 360", |value| value == 180.0 || value == 360.0)?;
-        let references = [("measured", Reference::Measured), ("commanded", Reference::Commanded)];
+        let references =
+            [("measured", Reference::Measured), ("commanded", Reference::Commanded), ("none", Reference::Absent)];
         let reference = self.choice(head, "reference", &references)?;
         let is_count = |value: f64| value >= 1.0 && value.fract() == 0.0;
         let pole_pairs = self.number(head, "pole_pairs", "a whole number from 1 on", is_count)?;
+        let temperature_c =
+            self.number(head, "temperature_c", "a temperature in °C", |value| value > ABSOLUTE_ZERO_C)?;
         let naming = self.columns(document)?;
         let runs = self.runs(document, instrument)?;
         Ok(Manifest {
@@ -133,6 +173,7 @@ impl Text<'_> {
             period_deg,
             reference,
             pole_pairs,
+            temperature_c,
             naming,
             runs,
             warnings,
@@ -172,6 +213,9 @@ impl Text<'_> {
             entries.push(self.run(table, run.span(), instrument)?);
         }
         let is_rotation = |entry: &&Entry| entry.kind == RunKind::Rotation;
+        if !entries.is_empty() && entries.iter().all(|entry| entry.kind == RunKind::Static) {
+            return Ok(entries);
+        }
         if !entries.iter().any(|entry| is_rotation(&entry)) {
             return Err(self.refuse(runs.span(), "no run is a rotation", WANTED));
         }
@@ -183,16 +227,19 @@ impl Text<'_> {
     }
 
     fn run(&self, table: &DeTable<'_>, span: Range<usize>, instrument: Instrument) -> Result<Entry, ReadError> {
-        let kinds = [("rotation", false), ("ringdown", true)];
-        let Some(is_ringdown) = self.choice(table, "kind", &kinds)? else {
-            return Err(self.refuse(span, "this run has no `kind`", "`kind = \"rotation\"` or `kind = \"ringdown\"`"));
+        let kinds = [("rotation", Kind::Rotation), ("ringdown", Kind::Ringdown), ("static", Kind::Static)];
+        let Some(kind) = self.choice(table, "kind", &kinds)? else {
+            let wanted = "`kind = \"rotation\"`, `kind = \"ringdown\"` or `kind = \"static\"`";
+            return Err(self.refuse(span, "this run has no `kind`", wanted));
         };
-        if is_ringdown && instrument == Instrument::Sensor {
-            let what = "a sensor has nothing that rings down";
-            return Err(self.refuse(span, what, "rotation runs only, or `instrument = \"gyroscope\"`"));
+        if kind == Kind::Ringdown && instrument == Instrument::Sensor {
+            return Err(ringdown_of_a_sensor(self.path, self.position(&span)));
         }
-        let (keys, place) =
-            if is_ringdown { (RINGDOWN_KEYS, "in a ring-down") } else { (ROTATION_KEYS, "in a rotation run") };
+        let (keys, place) = match kind {
+            Kind::Rotation => (ROTATION_KEYS, "in a rotation run"),
+            Kind::Ringdown => (RINGDOWN_KEYS, "in a ring-down"),
+            Kind::Static => (STATIC_KEYS, "in a run at rest"),
+        };
         self.refuse_unknown(table, keys, place)?;
         let Some(file) = get(table, "file") else {
             return Err(self.refuse(span, "this run has no `file`", "the path of a recording, relative to this file"));
@@ -206,17 +253,17 @@ impl Text<'_> {
                 || self.refuse(span.clone(), format!("this ring-down has no `{key}`"), format!("`{key}`, {wanted}"));
             self.number(table, key, wanted, is_right)?.ok_or_else(missing)
         };
-        let kind = if is_ringdown {
-            RunKind::Ringdown {
+        let kind = match kind {
+            Kind::Rotation => RunKind::Rotation,
+            Kind::Static => RunKind::Static,
+            Kind::Ringdown => RunKind::Ringdown {
                 angle_deg: required("angle_deg", "the angle in degrees at which the pattern is held", |_| true)?,
                 energy_off_s: required(
                     "energy_off_s",
                     "the positive time in s at which the energy loop goes off",
                     |value| value > 0.0,
                 )?,
-            }
-        } else {
-            RunKind::Rotation
+            },
         };
         Ok(Entry {
             kind,
@@ -225,6 +272,7 @@ impl Text<'_> {
             settle_s: self.number(table, "settle_s", "0 or more seconds", |value| value >= 0.0)?.unwrap_or(0.0),
             role: self.choice(table, "use", &[("fit", Role::Fit), ("holdout", Role::Holdout)])?.unwrap_or_default(),
             amplitude: self.number(table, "amplitude", "a positive relative amplitude", |value| value > 0.0)?,
+            rate_dps: self.number(table, "rate_dps", "a constant rate in deg/s", |_| true)?,
         })
     }
 

@@ -32,6 +32,8 @@ pub enum Reference {
     Measured,
     /// It is what was asked for: the table may have done something else.
     Commanded,
+    /// There is none: columns that look like one are not to be used.
+    Absent,
 }
 
 /// What was done in a run.
@@ -46,6 +48,20 @@ pub enum RunKind {
         /// Time at which the energy loop is switched off, s, on the time axis of the recording; positive.
         energy_off_s: f64,
     },
+    /// The instrument stood still.
+    Static,
+}
+
+impl RunKind {
+    /// Its name in a campaign file.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Ringdown { .. } => "ringdown",
+            Self::Static => "static",
+        }
+    }
 }
 
 /// What a run is used for.
@@ -112,6 +128,8 @@ pub struct Campaign {
     pub reference: Option<Reference>,
     /// Periods of the sensor's angle per turn of its reference, where the campaign says so.
     pub pole_pairs: Option<f64>,
+    /// Temperature that parameters refer to, °C, where the campaign says so.
+    pub temperature_c: Option<f64>,
     /// The runs, in the order of the file.
     pub runs: Vec<Run>,
     /// What a reader of the result should know of the campaign file; the recordings have their own warnings.
@@ -133,11 +151,19 @@ impl Campaign {
     /// # Errors
     /// As [`Campaign::open`], and where a mapped column is not there.
     pub fn open_named(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
+        Self::open_as(path, naming, None)
+    }
+
+    /// [`Campaign::open_named`] of an instrument that is known from elsewhere; it stands over what the file says.
+    ///
+    /// # Errors
+    /// As [`Campaign::open_named`], and where a sensor has a ring-down.
+    pub fn open_as(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
         let is_manifest = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
         if is_manifest {
-            Self::open_manifest(path, naming)
+            Self::open_manifest(path, naming, instrument)
         } else {
-            Self::of_recordings(vec![Recording::read_named(path, naming)?])
+            Self::of_recordings_as(vec![Recording::read_named(path, naming)?], instrument.unwrap_or_default())
         }
     }
 
@@ -147,6 +173,14 @@ impl Campaign {
     /// # Errors
     /// [`ReadError::MissingColumns`] where a recording is none of a rotation.
     pub fn of_recordings(recordings: Vec<Recording>) -> Result<Self, ReadError> {
+        Self::of_recordings_as(recordings, Instrument::default())
+    }
+
+    /// [`Campaign::of_recordings`] of this instrument. A sensor's need no reference: its two channels tell their own errors.
+    ///
+    /// # Errors
+    /// As [`Campaign::of_recordings`].
+    pub fn of_recordings_as(recordings: Vec<Recording>, instrument: Instrument) -> Result<Self, ReadError> {
         let sources: Vec<PathBuf> = recordings.iter().map(|r| r.source.clone()).collect();
         let name = match sources.as_slice() {
             [one] => one.file_stem().map(OsStr::to_owned),
@@ -154,8 +188,8 @@ impl Campaign {
             [] => None,
         };
         let device = name.map_or_else(|| "recordings".to_owned(), |name| name.to_string_lossy().into_owned());
-        let runs = recordings.into_iter().map(Self::rotation).collect::<Result<_, _>>()?;
-        Ok(Self { source: sources.into_iter().next().unwrap_or_default(), device, runs, ..Self::default() })
+        let runs = recordings.into_iter().map(|r| Self::rotation(r, instrument)).collect::<Result<_, _>>()?;
+        Ok(Self { source: sources.into_iter().next().unwrap_or_default(), device, instrument, runs, ..Self::default() })
     }
 
     /// What a campaign file says its recordings call their columns.
@@ -166,9 +200,9 @@ impl Campaign {
         Ok(Self::manifest(path)?.naming)
     }
 
-    fn rotation(recording: Recording) -> Result<Run, ReadError> {
+    fn rotation(recording: Recording, instrument: Instrument) -> Result<Run, ReadError> {
         let path = recording.source.clone();
-        recording.require_rotation()?;
+        recording.require_turn(instrument, None)?;
         Ok(Run {
             kind: RunKind::Rotation,
             file: path.file_name().map(PathBuf::from).unwrap_or_default(),
@@ -187,19 +221,26 @@ impl Campaign {
         manifest::parse(&std::fs::read(path).map_err(io)?, path)
     }
 
-    fn open_manifest(path: &Path, naming: &Naming) -> Result<Self, ReadError> {
+    fn open_manifest(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
         let manifest = Self::manifest(path)?;
+        let instrument = instrument.unwrap_or(manifest.instrument);
         let naming = &naming.over(&manifest.naming);
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut runs: Vec<Run> = vec![];
         let mut warnings = manifest.warnings.clone();
         for entry in &manifest.runs {
             let file = folder.join(&entry.file);
-            let recording =
+            let mut recording =
                 Recording::read_named(&file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
+            warnings.extend(entry.constant_rate(&mut recording));
             match entry.kind {
-                RunKind::Rotation => recording.require_rotation()?,
+                RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,
+                RunKind::Ringdown { .. } if instrument == Instrument::Sensor => {
+                    return Err(manifest::ringdown_of_a_sensor(path, entry.at));
+                }
                 RunKind::Ringdown { .. } => recording.require_ringdown()?,
+                // every recording has an angle
+                RunKind::Static => {}
             }
             if runs.iter().any(|other| other.recording.source == file) {
                 warnings.push(format!(
@@ -220,7 +261,8 @@ impl Campaign {
             run.settled()?;
             runs.push(run);
         }
-        let Manifest { device, instrument, carrier_hz, angular_gain, period_deg, reference, pole_pairs, .. } = manifest;
+        let Manifest { device, carrier_hz, angular_gain, period_deg, reference, pole_pairs, temperature_c, .. } =
+            manifest;
         Ok(Self {
             source: path.to_path_buf(),
             device,
@@ -230,6 +272,7 @@ impl Campaign {
             period_deg,
             reference,
             pole_pairs,
+            temperature_c,
             runs,
             warnings,
         })
@@ -252,12 +295,17 @@ impl Campaign {
         push_number(&mut text, "angular_gain", self.angular_gain);
         push_number(&mut text, "period_deg", self.period_deg);
         push_number(&mut text, "pole_pairs", self.pole_pairs);
+        push_number(&mut text, "temperature_c", self.temperature_c);
         if let Some(reference) = self.reference {
-            let word = if reference == Reference::Commanded { "commanded" } else { "measured" };
+            let word = match reference {
+                Reference::Measured => "measured",
+                Reference::Commanded => "commanded",
+                Reference::Absent => "none",
+            };
             let _ = writeln!(text, "reference = \"{word}\"");
         }
         for run in &self.runs {
-            let kind = if run.kind == RunKind::Rotation { "rotation" } else { "ringdown" };
+            let kind = run.kind.name();
             let file = quoted(&run.file.to_string_lossy());
             // Writing to a string does not fail.
             let _ = write!(text, "\n[[run]]\nkind = \"{kind}\"\nfile = {file}\n");
