@@ -16,8 +16,8 @@ use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
-use crate::recording::{Campaign, Instrument, Role};
-use crate::report::calibration::Calibration;
+use crate::recording::{Campaign, Instrument, Reference, Role, RunKind};
+use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
@@ -109,12 +109,14 @@ pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Resul
 }
 
 fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+    require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
         return angle_sensor::identify(campaign, options, pictured);
     }
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
     let inputs = provenance::sums(&provenance::files(&campaign));
+    let amplitude_v = provenance::amplitudes(&campaign);
     (options.progress)("preparing the runs");
     let mut bench = Bench::new(campaign)?;
     (options.progress)("fitting the declared model");
@@ -235,9 +237,12 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         runs,
         decomposition: Vec::new(),
         proposals: Vec::new(),
+        scale_factor: None,
+        allan: None,
         warnings,
     };
-    let mut calibration = Calibration { device, hypothesis: fitted.fit.hypothesis };
+    let provenance = Provenance { tool: Some(Tool::default()), inputs: report.inputs.clone(), amplitude_v };
+    let mut calibration = Calibration { device, hypothesis: fitted.fit.hypothesis, provenance };
     gate::pass(&report, &calibration, facts)?;
     if let Some(reason) = no_better(&report.heldout, after.errors().count()) {
         (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
@@ -251,6 +256,23 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         steps,
         picture,
     })
+}
+
+/// An identification has an angle and what it should be in every run that turns.
+fn require_a_reference(campaign: &Campaign) -> Result<(), Refusal> {
+    if let Some(run) = campaign.runs.iter().find(|r| r.kind == RunKind::Static) {
+        let name = run.file.display().to_string();
+        return Err(Refusal::new(&name, "a run at rest has no angular gain", "cvg_calibration::answer"));
+    }
+    if campaign.reference == Some(Reference::Absent) {
+        let wanted = "rate_dps or table_deg, or instrument = \"sensor\"";
+        return Err(Refusal::new(
+            "campaign",
+            "reference = \"none\": there is nothing to tell an angle error against",
+            wanted,
+        ));
+    }
+    Ok(())
 }
 
 /// Why what was found is of no use, where it is not: on `samples` held-out samples the error is larger with it than without,
@@ -271,8 +293,8 @@ pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {
     let d = &run.recording.dropped;
     RunReport {
         file: run.file.display().to_string(),
-        kind: if run.kind == crate::recording::RunKind::Rotation { "rotation".into() } else { "ringdown".into() },
-        r#use: "fit".into(),
+        kind: run.kind.name().into(),
+        r#use: if run.kind == RunKind::Static { "at rest".into() } else { "fit".into() },
         rows: run.recording.len(),
         dropped: dropped(d),
         rate_dps: None,

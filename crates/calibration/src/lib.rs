@@ -42,8 +42,11 @@ mod identification;
 mod model;
 pub mod report;
 mod selection;
+mod survey;
 
+pub use angle_sensor::reference_free::Curve;
 pub use cvg_recording as recording;
+pub use diagnostics::allan;
 pub use diagnostics::evaluate::ErrorSize;
 pub use diagnostics::picture;
 pub use diagnostics::residual::{Follows, Harmonic};
@@ -54,5 +57,6 @@ pub use identification::{BiasCurve, Figures, Identification, Options, identify, 
 pub use model::angle_table::{AngleTable, Form};
 pub use model::hypothesis::{ChannelClip, Hypothesis, Member, Origin, Unknown};
 pub use report::calibration;
-pub use report::compensate::compensate;
+pub use report::compensate::{compensate, left_out, outside};
 pub use selection::discovery;
+pub use survey::{Answer, Surveyed, answer};

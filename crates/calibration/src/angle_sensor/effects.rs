@@ -53,7 +53,7 @@ impl From<&Readout> for LibraryReadout {
 
 impl LibraryReadout {
     /// Offsets, gain ratio, skew, cubics.
-    fn values(&self) -> [f64; 6] {
+    pub(crate) fn values(&self) -> [f64; 6] {
         [self.offset[0], self.offset[1], self.gain_ratio, self.skew, self.kappa, self.kappa_difference]
     }
 }
@@ -77,12 +77,7 @@ type Refit = (Option<LibraryReadout>, TableFit);
 pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations {
     let fits: Vec<Refit> = (0..BLOCKS)
         .filter_map(|block| {
-            let without = |r: &SensorRun| {
-                let n = r.len();
-                let rows: Vec<usize> = (0..n).filter(|i| i * BLOCKS / n != block).collect();
-                r.subset(&rows)
-            };
-            let kept: Vec<SensorRun> = runs.iter().map(without).collect();
+            let kept = without_block(runs, block);
             let readout = match &model.readout {
                 Some((r, weighting)) if r.kind != Kind::Plain => {
                     Some(fit(r.kind, *weighting, &kept, model.sensor.gain, r)?.readout)
@@ -95,12 +90,7 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
             Some((readout.as_ref().map(LibraryReadout::from), table))
         })
         .collect();
-    let of = |value: &dyn Fn(&Refit) -> f64| {
-        let values: Vec<f64> = fits.iter().map(value).collect();
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        ((n - 1.0) / n * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt()
-    };
+    let of = |value: &dyn Fn(&Refit) -> f64| jackknife(&fits.iter().map(value).collect::<Vec<_>>());
     let readout = |i: usize| of(&|f| f.0.map_or(0.0, |r| r.values()[i]));
     let order = model.table.table.cos.len();
     let other = noise_model_difference(model, runs);
@@ -116,7 +106,14 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
 /// proportion to it: the algebraic ellipse instead of the one in the logarithm. Where an ellipse is not what the channels
 /// draw the two differ by more than either scatters, and no block tells which is right (Hausman 1978).
 fn noise_model_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
-    let Some(readout) = model.front().filter(|r| model.by_radius && r.kind == Kind::Affine) else { return [0.0; 6] };
+    model.front().filter(|_| model.by_radius).map_or([0.0; 6], |readout| other_noise(readout, runs))
+}
+
+/// [`noise_model_difference`] of a readout that is known from its radius alone.
+pub(crate) fn other_noise(readout: &Readout, runs: &[SensorRun]) -> [f64; 6] {
+    if readout.kind != Kind::Affine {
+        return [0.0; 6];
+    }
     let Some(algebraic) = super::ellipse::algebraic(runs) else { return [0.0; 6] };
     let [ours, theirs] = [readout, &algebraic].map(|r| LibraryReadout::from(r).values());
     std::array::from_fn(|i| ours[i] - theirs[i])
@@ -201,42 +198,7 @@ impl Described<'_> {
 
     fn readout_effects(&self) -> Vec<EffectReport> {
         let Some((readout, _)) = &self.model.readout else { return Vec::new() };
-        let (v, d) = (LibraryReadout::from(readout).values(), self.deviations.readout);
-        let significant = |i: usize, neutral: f64| (v[i] - neutral).abs() > STUDENT_19 * d[i];
-        let mut out = Vec::new();
-        let mut add = |id: EffectId, origin: Origin, at: &[usize]| {
-            let library = id.description().parameters;
-            let parameters = at.iter().zip(library).map(|(&i, p)| parameter(p.name, p.unit, v[i], d[i])).collect();
-            out.push(effect(
-                library_id(id),
-                origin,
-                parameters,
-                format!("{}; {}", id.description().signature, self.evidence()),
-            ));
-        };
-        let kind = readout.kind;
-        if kind >= Kind::Affine {
-            add(EffectId::DetectionGainMismatch, Origin::Declared, &[2]);
-        }
-        if kind >= Kind::Offset && (significant(0, 0.0) || significant(1, 0.0)) {
-            add(EffectId::DetectionOffset, Origin::Discovered, &[0, 1]);
-        }
-        if kind >= Kind::Affine && significant(3, 0.0) {
-            add(EffectId::DetectionSkew, Origin::Discovered, &[3]);
-        }
-        if kind >= Kind::Cubic && (significant(4, 0.0) || significant(5, 0.0)) {
-            add(EffectId::DetectionCubic, Origin::Discovered, if kind == Kind::Cubic { &[4] } else { &[4, 5] });
-        }
-        if readout.rails.any() {
-            let names = ["x_low", "x_high", "y_low", "y_high"];
-            let limits = readout.rails.limits.iter().flatten().zip(names).filter(|(l, _)| l.is_finite());
-            let rails =
-                limits.map(|(l, name)| ParameterReport { name: name.into(), unit: "V".into(), value: *l, ci95: None });
-            let evidence = "the extreme value of the channel occurs far more often than the level beside it: a converter \
-                            at its rail; the other channel and the radius stand in for it";
-            out.push(effect("detection-clip", Origin::Discovered, rails.collect(), evidence.into()));
-        }
-        out
+        readout_effects(readout, self.deviations.readout, &self.evidence())
     }
 
     fn motion_effects(&self) -> Vec<EffectReport> {
@@ -333,18 +295,8 @@ impl Described<'_> {
             let at = h.members.partition_point(|m| m.id <= id);
             h.members.insert(at, Member { id, values, origin, refined: true });
         };
-        if let Some((readout, _)) = &m.readout {
-            let v = LibraryReadout::from(readout);
-            if readout.kind >= Kind::Offset {
-                admit(EffectId::DetectionOffset, Origin::Discovered, [v.offset[0], v.offset[1], 0.0, 0.0]);
-            }
-            if readout.kind >= Kind::Affine {
-                admit(EffectId::DetectionGainMismatch, Origin::Declared, [v.gain_ratio, 0.0, 0.0, 0.0]);
-                admit(EffectId::DetectionSkew, Origin::Discovered, [v.skew, 0.0, 0.0, 0.0]);
-            }
-            if readout.kind >= Kind::Cubic {
-                admit(EffectId::DetectionCubic, Origin::Discovered, [v.kappa, v.kappa_difference, 0.0, 0.0]);
-            }
+        for (id, origin, values) in m.front().map(readout_members).unwrap_or_default() {
+            admit(id, origin, values);
         }
         let side = &m.table.side;
         match m.table.shape.motion {
@@ -358,12 +310,84 @@ impl Described<'_> {
             }
         }
         h.angle_table = (!m.table.table.cos.is_empty()).then(|| m.table.table.clone());
-        h.clip = m
-            .front()
-            .filter(|r| r.rails.any())
-            .map(|r| ChannelClip { rails_v: r.rails.limits, amplitude_v: LibraryReadout::from(r).amplitude });
+        h.clip = m.front().and_then(clip);
         h
     }
+}
+
+/// A readout in the words of the library, with the deviations of its values.
+pub(crate) fn readout_effects(readout: &Readout, d: [f64; 6], evidence: &str) -> Vec<EffectReport> {
+    let v = LibraryReadout::from(readout).values();
+    let significant = |i: usize, neutral: f64| (v[i] - neutral).abs() > STUDENT_19 * d[i];
+    let mut out = Vec::new();
+    let mut add = |id: EffectId, origin: Origin, at: &[usize]| {
+        let library = id.description().parameters;
+        let parameters = at.iter().zip(library).map(|(&i, p)| parameter(p.name, p.unit, v[i], d[i])).collect();
+        out.push(effect(library_id(id), origin, parameters, format!("{}; {evidence}", id.description().signature)));
+    };
+    let kind = readout.kind;
+    if kind >= Kind::Affine {
+        add(EffectId::DetectionGainMismatch, Origin::Declared, &[2]);
+    }
+    if kind >= Kind::Offset && (significant(0, 0.0) || significant(1, 0.0)) {
+        add(EffectId::DetectionOffset, Origin::Discovered, &[0, 1]);
+    }
+    if kind >= Kind::Affine && significant(3, 0.0) {
+        add(EffectId::DetectionSkew, Origin::Discovered, &[3]);
+    }
+    if kind >= Kind::Cubic && (significant(4, 0.0) || significant(5, 0.0)) {
+        add(EffectId::DetectionCubic, Origin::Discovered, if kind == Kind::Cubic { &[4] } else { &[4, 5] });
+    }
+    if readout.rails.any() {
+        let names = ["x_low", "x_high", "y_low", "y_high"];
+        let limits = readout.rails.limits.iter().flatten().zip(names).filter(|(l, _)| l.is_finite());
+        let rails =
+            limits.map(|(l, name)| ParameterReport { name: name.into(), unit: "V".into(), value: *l, ci95: None });
+        let evidence = "the extreme value of the channel occurs far more often than the level beside it: a converter \
+                        at its rail; the other channel and the radius stand in for it";
+        out.push(effect("detection-clip", Origin::Discovered, rails.collect(), evidence.into()));
+    }
+    out
+}
+
+/// A readout as members of a hypothesis.
+pub(crate) fn readout_members(readout: &Readout) -> Vec<(EffectId, Origin, [f64; 4])> {
+    let v = LibraryReadout::from(readout);
+    let mut out = Vec::new();
+    if readout.kind >= Kind::Offset {
+        out.push((EffectId::DetectionOffset, Origin::Discovered, [v.offset[0], v.offset[1], 0.0, 0.0]));
+    }
+    if readout.kind >= Kind::Affine {
+        out.push((EffectId::DetectionGainMismatch, Origin::Declared, [v.gain_ratio, 0.0, 0.0, 0.0]));
+        out.push((EffectId::DetectionSkew, Origin::Discovered, [v.skew, 0.0, 0.0, 0.0]));
+    }
+    if readout.kind >= Kind::Cubic {
+        out.push((EffectId::DetectionCubic, Origin::Discovered, [v.kappa, v.kappa_difference, 0.0, 0.0]));
+    }
+    out
+}
+
+/// The rails of a readout, where one was reached.
+pub(crate) fn clip(readout: &Readout) -> Option<ChannelClip> {
+    let amplitude_v = LibraryReadout::from(readout).amplitude;
+    readout.rails.any().then_some(ChannelClip { rails_v: readout.rails.limits, amplitude_v })
+}
+
+/// Standard deviation of a value by the jackknife, from its values without one block after the other.
+pub(crate) fn jackknife(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    ((n - 1.0) / n * values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt()
+}
+
+/// Each run without one of [`BLOCKS`] contiguous blocks.
+pub(crate) fn without_block(runs: &[SensorRun], block: usize) -> Vec<SensorRun> {
+    let without = |r: &SensorRun| {
+        let n = r.len();
+        let rows: Vec<usize> = (0..n).filter(|i| i * BLOCKS / n != block).collect();
+        r.subset(&rows)
+    };
+    runs.iter().map(without).collect()
 }
 
 fn library_id(id: EffectId) -> &'static str {

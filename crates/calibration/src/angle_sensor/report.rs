@@ -12,7 +12,7 @@ use crate::estimation::statistics::median;
 use crate::identification::{BiasCurve, Figures, Identification, run_report};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::Campaign;
-use crate::report::calibration::Calibration;
+use crate::report::calibration::{Calibration, Provenance};
 use crate::report::provenance;
 use crate::report::stages::stages;
 use crate::report::{
@@ -51,6 +51,7 @@ pub(crate) struct Head {
     device: String,
     runs: Vec<RunReport>,
     inputs: Vec<Input>,
+    amplitude_v: Option<[f64; 2]>,
     warnings: Vec<String>,
 }
 
@@ -60,6 +61,7 @@ impl Head {
             device: campaign.device.clone(),
             runs: campaign.runs.iter().map(run_report).collect(),
             inputs: provenance::sums(&provenance::files(campaign)),
+            amplitude_v: provenance::amplitudes(campaign),
             warnings: campaign.runs.iter().flat_map(|r| r.recording.warnings.iter().cloned()).collect(),
         }
     }
@@ -156,12 +158,15 @@ pub(crate) fn report(
         runs: runs(&head, fitted, held, &on_fit, &after),
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
+        scale_factor: None,
+        allan: None,
         warnings,
     };
     let figures =
         Figures { bias: curves(held, raw.as_ref(), &declared, &after, finding.period), ring_downs: Vec::new() };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
-    let calibration = Calibration { device: head.device, hypothesis };
+    let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: head.amplitude_v };
+    let calibration = Calibration { device: head.device, hypothesis, provenance };
     Identification { report, calibration, figures, steps: Vec::new(), picture }
 }
 

@@ -45,7 +45,7 @@ const FITTED_SHARE: f64 = 0.75;
 const FEWEST_ROWS: usize = 8;
 
 impl SensorRun {
-    fn new(run: Run, number: usize, stated: Option<Reference>) -> Result<Self, Refusal> {
+    pub(crate) fn new(run: Run, number: usize, stated: Option<Reference>) -> Result<Self, Refusal> {
         let settled = run.settled()?;
         let name = run.file.display().to_string();
         let r = run.recording;
@@ -76,6 +76,32 @@ impl SensorRun {
             rate_rad_s,
             acceleration_rad_s2,
             reading,
+        })
+    }
+
+    /// A run of two channels that nothing else is known of: its reference stands at zero.
+    pub(crate) fn without_reference(run: Run, number: usize) -> Result<Self, Refusal> {
+        let settled = run.settled()?;
+        let name = run.file.display().to_string();
+        let r = run.recording;
+        let (Some(x), Some(y)) = (&r.xc_v, &r.yc_v) else {
+            return Err(Refusal::new(
+                &name,
+                "an angle alone says nothing of its own errors",
+                "xc_v and yc_v, or a reference: table_deg or rate_dps",
+            ));
+        };
+        let still = vec![0.0; settled.len()];
+        Ok(Self {
+            name,
+            number,
+            role: run.role,
+            commanded: false,
+            t_s: r.t_s[settled.clone()].to_vec(),
+            reference_rad: still.clone(),
+            rate_rad_s: still.clone(),
+            acceleration_rad_s2: still,
+            reading: Reading::Channels(settled.map(|i| [x[i], y[i]]).collect()),
         })
     }
 
@@ -128,7 +154,14 @@ impl SensorRun {
 pub(crate) fn prepare(campaign: Campaign) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
     let stated = campaign.reference;
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::new(r, i, stated));
-    let runs: Vec<SensorRun> = runs.collect::<Result<_, _>>()?;
+    apart(runs.collect::<Result<_, _>>()?)
+}
+
+/// The runs to fit, and those held out.
+///
+/// # Errors
+/// Where nothing to fit is left.
+pub(crate) fn apart(runs: Vec<SensorRun>) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
     let (fit, held): (Vec<_>, Vec<_>) = if runs.iter().any(|r| r.role == Role::Holdout) {
         runs.into_iter().partition(|r| r.role == Role::Fit)
     } else {

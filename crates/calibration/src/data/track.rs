@@ -253,7 +253,7 @@ fn input_angle(recording: &mut Recording) -> Vec<f64> {
     if let Some(table) = table {
         return along_rate(&table, rate.as_deref(), t);
     }
-    let rate = rate.unwrap_or_default();
+    let Some(rate) = rate else { return vec![0.0; t.len()] };
     let mut angle = 0.0;
     let mut out = Vec::with_capacity(t.len());
     for i in 0..rate.len().min(t.len()) {

@@ -28,8 +28,6 @@ pub(crate) struct Row<'a> {
     pub(crate) vibration: Envelope<f64>,
     /// precession by the mechanics and the commands since the start of the segment, rad
     pub(crate) drift: f64,
-    /// input angle that the input effects added since then, rad
-    pub(crate) excess: f64,
     /// angle observed minus predicted, rad, within ± half a period
     pub(crate) angle: f64,
     /// ln of the amplitude
@@ -154,7 +152,6 @@ pub(crate) fn walk(
             precession: at.precession_rad_s,
             vibration: vibration.envelope,
             drift: integrals.sum[0],
-            excess: excess.value,
             angle: wrapped(vibration.theta - predicted, hypothesis.period_rad),
             ln_amplitude: vibration.ln_amplitude,
             growth: vibration.growth,

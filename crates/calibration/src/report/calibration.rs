@@ -11,6 +11,7 @@ use crate::error::Refusal;
 use crate::model::angle_table::AngleTable;
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
 use crate::recording::Instrument;
+use crate::report::{Input, Tool};
 
 /// Identifier of the format.
 pub const SCHEMA: &str = "cvg.calibration/1";
@@ -21,10 +22,11 @@ const CHECKSUM: &str = "checksum = \"crc32:";
 ///
 /// ```
 /// use cvg_calibration::recording::Instrument;
-/// use cvg_calibration::{Hypothesis, calibration::Calibration};
+/// use cvg_calibration::{Hypothesis, calibration::{Calibration, Provenance}};
 ///
 /// let hypothesis = Hypothesis::ideal(Instrument::Gyroscope, core::f64::consts::PI, 0.78);
-/// let text = Calibration { device: "dfp-7".into(), hypothesis }.to_text();
+/// let calibration = Calibration { device: "dfp-7".into(), hypothesis, provenance: Provenance::default() };
+/// let text = calibration.to_text();
 /// assert_eq!(Calibration::from_text(&text, "calibration.toml")?.device, "dfp-7");
 /// // what was changed afterwards is refused
 /// assert!(Calibration::from_text(&text.replace("0.78", "0.79"), "calibration.toml").is_err());
@@ -36,6 +38,19 @@ pub struct Calibration {
     pub device: String,
     /// what is known of it
     pub hypothesis: Hypothesis,
+    /// what it was made of
+    pub provenance: Provenance,
+}
+
+/// What a calibration was made of, and for which recordings it is meant.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Provenance {
+    /// the program
+    pub tool: Option<Tool>,
+    /// the files that were read
+    pub inputs: Vec<Input>,
+    /// smallest and largest amplitude of the readout, in its unit, as the medians of runs; none where only an angle was read
+    pub amplitude_v: Option<[f64; 2]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -51,6 +66,12 @@ struct File {
     control_latency_s: f64,
     #[serde(default, skip_serializing_if = "is_zero")]
     rate_bias_rad_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    amplitude_v: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tool: Option<Tool>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    input: Vec<Input>,
     #[serde(default)]
     effect: Vec<EffectEntry>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -105,6 +126,9 @@ impl Calibration {
                 })
                 .collect(),
             rate_bias_rad_s: h.rate_bias_rad_s,
+            amplitude_v: self.provenance.amplitude_v,
+            tool: self.provenance.tool.clone(),
+            input: self.provenance.inputs.clone(),
             angle_table: h.angle_table.clone(),
             clip: h.clip,
         };
@@ -165,7 +189,8 @@ impl Calibration {
         hypothesis.angle_table = file.angle_table;
         hypothesis.clip = file.clip;
         hypothesis.rate_bias_rad_s = file.rate_bias_rad_s;
-        Ok(Self { device: file.device, hypothesis })
+        let provenance = Provenance { tool: file.tool, inputs: file.input, amplitude_v: file.amplitude_v };
+        Ok(Self { device: file.device, hypothesis, provenance })
     }
 
     /// Reads a calibration file.

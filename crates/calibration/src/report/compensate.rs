@@ -1,20 +1,29 @@
 //! A recording with the identified errors taken out: readouts are undone, precession that the mechanics and the
 //! commands add is turned back, and a reference that the table did not keep is corrected.
 
-use cvg_model::effects::Moment;
+use cvg_model::effects::{EffectId, Moment, Stage};
 
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
 use crate::estimation::propagation::{Pace, Start, walk};
-use crate::model::prediction::Predictor;
+use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
-use crate::recording::{Recording, Role, Run, RunKind};
+use crate::recording::{Instrument, Recording, Role, Run, RunKind};
 use crate::report::calibration::Calibration;
+use crate::report::provenance::amplitude;
+
+/// An amplitude beyond the calibration's by this factor is another unit, or another instrument.
+const ANOTHER_UNIT: f64 = 3.0;
+/// … and by this factor, outside what was calibrated.
+const OUTSIDE: f64 = 1.2;
+/// Units that are taken for volts, and what they are called.
+const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3, "kilovolts")];
 
 /// Compensates a recording.
 ///
-/// Changed are `xc_v`, `xs_v`, `yc_v`, `ys_v` and `theta_deg`, as far as they are there; `rate_dps` or `table_deg` only
-/// where an input effect was identified. All else is kept.
+/// Changed are `xc_v`, `xs_v`, `yc_v`, `ys_v` and `theta_deg`, as far as they are there; `theta_deg` is added where only
+/// the readout is there. All else is kept, the reference too. Effects that follow the table or the clock of a recording
+/// ([`left_out`]) are not undone.
 ///
 /// ```no_run
 /// use cvg_calibration::{calibration::Calibration, compensate, recording::Recording};
@@ -26,9 +35,11 @@ use crate::report::calibration::Calibration;
 /// ```
 ///
 /// # Errors
-/// Where the recording has no angle or no reference.
+/// Where the recording has no angle, no reference though the calibration needs one, or another unit than the calibration.
 pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Recording, Refusal> {
-    let h = &calibration.hypothesis;
+    let h = &portable(&calibration.hypothesis);
+    same_unit(calibration, recording)?;
+    needs_no_reference(h, recording)?;
     let run = Run {
         kind: RunKind::Rotation,
         file: recording.source.clone(),
@@ -39,9 +50,9 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     };
     let track = Track::whole(run, h.period_rad)?;
     let mut out = recording.clone();
+    let mut angle_rad: Vec<f64> = Vec::new();
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
     let none = Unknowns::new(h, Vec::new());
-    let predictor = Predictor::new(h, &none);
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     for segment in &track.segments {
         walk(&track, segment, h, &none, Start::default(), Pace::every(1), |row| {
@@ -67,12 +78,78 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
                 let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
                 theta[i] += (wrapped(h.bearing(&z) - h.bearing(&seen), h.period_rad) - drift_rad).to_degrees();
             }
-            if let Some(table) = &mut out.table_deg {
-                table[i] += row.excess.to_degrees();
-            } else if let Some(rate) = &mut out.rate_dps {
-                rate[i] += predictor.excess_rate(rate[i].to_radians(), &at).value.to_degrees();
+            if channels && recording.theta_deg.is_none() {
+                angle_rad.push(h.bearing(&z));
             }
         });
     }
+    if channels && recording.theta_deg.is_none() {
+        let mut last = angle_rad.first().copied().unwrap_or(0.0);
+        out.theta_deg = Some(
+            angle_rad
+                .iter()
+                .map(|angle| {
+                    last += wrapped(angle - last, h.period_rad);
+                    last.to_degrees()
+                })
+                .collect(),
+        );
+    }
     Ok(out)
+}
+
+/// Effects of a calibration that are not undone in another recording: those of the table, and those of one recording's clock.
+#[must_use]
+pub fn left_out(calibration: &Calibration) -> Vec<EffectId> {
+    calibration.hypothesis.members.iter().map(|m| m.id).filter(|id| !is_portable(*id)).collect()
+}
+
+fn is_portable(id: EffectId) -> bool {
+    id.description().stage != Stage::Input && !id.in_time()
+}
+
+fn portable(hypothesis: &Hypothesis) -> Hypothesis {
+    let mut h = hypothesis.clone();
+    h.members.retain(|m| is_portable(m.id));
+    h
+}
+
+/// What a recording at another amplitude than the calibration's is worth, in words; none where it is the same.
+#[must_use]
+pub fn outside(calibration: &Calibration, recording: &Recording) -> Option<String> {
+    let ([low, high], here) = (calibration.provenance.amplitude_v?, amplitude(recording)?);
+    let within = (low / OUTSIDE..=high * OUTSIDE).contains(&here);
+    (!within).then(|| {
+        format!("its amplitude is {here:.4e}, the calibration was made from {low:.4e} to {high:.4e}: what goes with the amplitude is extrapolated")
+    })
+}
+
+fn same_unit(calibration: &Calibration, recording: &Recording) -> Result<(), Refusal> {
+    let Some(([low, high], here)) = calibration.provenance.amplitude_v.zip(amplitude(recording)) else { return Ok(()) };
+    if (low / ANOTHER_UNIT..=high * ANOTHER_UNIT).contains(&here) {
+        return Ok(());
+    }
+    let usual = (low * high).sqrt();
+    let unit = UNITS.iter().find(|(factor, _)| (here / usual / factor).log10().abs() < 0.5);
+    let looks = unit.map_or(String::new(), |(factor, name)| {
+        format!(", {factor:.0e} times as much, as of {name}: --map 'xc_v=xc_v*{:.0e}' and so on", 1.0 / factor)
+    });
+    Err(Refusal::new(
+        &recording.source.display().to_string(),
+        format!("its amplitude is {here:.4e}, the calibration was made at {usual:.4e}{looks}"),
+        "a recording of the calibrated instrument in the unit of its calibration",
+    ))
+}
+
+/// A recording without a reference can be compensated where nothing follows the rate.
+fn needs_no_reference(h: &Hypothesis, recording: &Recording) -> Result<(), Refusal> {
+    if recording.rate_dps.is_some() || recording.table_deg.is_some() {
+        return Ok(());
+    }
+    let readout = |m: &Member| m.id.description().stage == Stage::Readout && !m.id.acts_on_angle();
+    if h.instrument == Instrument::Sensor && h.members.iter().all(readout) {
+        return Ok(());
+    }
+    recording.require_rotation()?;
+    Ok(())
 }

@@ -53,6 +53,7 @@ pub struct Input {
     /// file
     pub file: String,
     /// CRC-32 (IEEE 802.3) of its bytes, as eight hexadecimal digits; null where they cannot be read twice
+    #[serde(default)]
     pub crc32: Option<String>,
 }
 
@@ -293,6 +294,41 @@ pub struct RunReport {
     pub agrees: Option<bool>,
 }
 
+/// How far the angle of an instrument at rest wanders, over which time: the overlapping Allan deviation of its rate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Allan {
+    /// angle random walk, deg/√h; null where the deviation has no stretch of it
+    pub angle_random_walk_deg_sqrt_h: Option<Estimate>,
+    /// bias instability, deg/h: the lowest deviation over √(2 ln 2/π)
+    pub bias_instability_dph: Estimate,
+    /// averaging time at which the deviation is lowest, s
+    pub bias_instability_tau_s: f64,
+    /// sampling interval, s
+    pub interval_s: f64,
+    /// the deviation
+    pub points: Vec<AllanPoint>,
+}
+
+/// The Allan deviation at one averaging time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AllanPoint {
+    /// averaging time, s
+    pub tau_s: f64,
+    /// deviation, deg/h
+    pub deviation_dph: f64,
+    /// its 95 % interval
+    pub ci95: [f64; 2],
+}
+
+/// How the scale factor goes with the input rate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScaleFactor {
+    /// angular gain at the fastest less that at the slowest rate, either sense alike, over their mean, ppm
+    pub nonlinearity_ppm: Estimate,
+    /// angular gain at positive less that at negative rates, over their mean, ppm
+    pub asymmetry_ppm: Estimate,
+}
+
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -334,6 +370,10 @@ pub struct Report {
     pub decomposition: Vec<Share>,
     /// effects that are proposed for the library, each in the form of an effect file
     pub proposals: Vec<serde_json::Value>,
+    /// how the scale factor goes with the rate; null where fewer than three rates of both senses are there
+    pub scale_factor: Option<ScaleFactor>,
+    /// how far the angle wanders at rest; null without a run at rest
+    pub allan: Option<Allan>,
     /// what a reader must know
     pub warnings: Vec<String>,
 }

@@ -9,6 +9,7 @@ pub(crate) mod provenance;
 pub mod refused;
 pub(crate) mod runs;
 pub(crate) mod stages;
+pub mod survey;
 pub(crate) mod unexplained;
 
 pub use facts::*;

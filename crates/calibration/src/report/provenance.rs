@@ -4,11 +4,15 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use crate::recording::Campaign;
+use crate::estimation::statistics::median;
+use crate::recording::{Campaign, Recording, RunKind};
 use crate::report::Input;
 
 /// Bytes that are read at once.
 const PIECE: usize = 1 << 16;
+
+/// Rows that a median amplitude is taken of.
+const ENOUGH_ROWS: usize = 10_000;
 
 /// A file and what the campaign calls it.
 #[derive(Debug, Clone)]
@@ -34,6 +38,24 @@ pub(crate) fn files(campaign: &Campaign) -> Vec<Named> {
 /// The checksums of files.
 pub(crate) fn sums(files: &[Named]) -> Vec<Input> {
     files.iter().map(|f| Input { file: f.name.clone(), crc32: crc32(&f.path) }).collect()
+}
+
+/// Smallest and largest amplitude of the readout in the runs that turn, as the medians of runs.
+pub(crate) fn amplitudes(campaign: &Campaign) -> Option<[f64; 2]> {
+    let turning = campaign.runs.iter().filter(|r| r.kind == RunKind::Rotation);
+    let medians: Vec<f64> = turning.filter_map(|r| amplitude(&r.recording)).collect();
+    let (low, high) = medians.iter().fold((f64::INFINITY, 0.0f64), |(l, h), &m| (l.min(m), h.max(m)));
+    (high > 0.0).then_some([low, high])
+}
+
+/// Median amplitude of a readout, √(x_c² + x_s² + y_c² + y_s²), in its unit.
+pub(crate) fn amplitude(recording: &Recording) -> Option<f64> {
+    let (x, y) = (recording.xc_v.as_ref()?, recording.yc_v.as_ref()?);
+    let part = |v: &Option<Vec<f64>>, i: usize| v.as_ref().map_or(0.0, |v| v[i]);
+    let stride = (x.len() / ENOUGH_ROWS).max(1);
+    let rows = (0..x.len()).step_by(stride);
+    let of = |i: usize| x[i].hypot(y[i]).hypot(part(&recording.xs_v, i).hypot(part(&recording.ys_v, i)));
+    Some(median(&mut rows.map(of).collect::<Vec<_>>()))
 }
 
 /// A file as the campaign names it, so that a report does not depend on where the campaign lies.

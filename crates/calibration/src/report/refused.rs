@@ -39,6 +39,8 @@ pub struct Refused {
     runs: Vec<RunReport>,
     decomposition: [(); 0],
     proposals: [(); 0],
+    scale_factor: Option<()>,
+    allan: Option<()>,
     warnings: [String; 0],
 }
 
@@ -80,6 +82,8 @@ impl About {
             runs: self.runs,
             decomposition: [],
             proposals: [],
+            scale_factor: None,
+            allan: None,
             warnings: [],
         }
     }

@@ -1,0 +1,272 @@
+//! A sensor of which nobody recorded what it was turned by: its two channels draw a closed curve, and a vibration or a field
+//! of constant size behind them would draw a circle. What bends the circle is told by the radius; what turns it within
+//! itself is not.
+
+use std::f64::consts::TAU;
+
+use super::cross_validation::{Candidate, Folds, choose, losses_of_radius};
+use super::effects::{LibraryReadout, clip, jackknife, other_noise, readout_effects, readout_members, without_block};
+use super::ellipse;
+use super::rails::Rails;
+use super::readout::{Kind, Readout};
+use super::readout_fit::{Weighting, fit};
+use super::samples::{SensorRun, apart, unwrapped};
+use crate::data::track::wrapped;
+use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
+use crate::error::Refusal;
+use crate::estimation::statistics::line;
+use crate::model::hypothesis::{Hypothesis, Member};
+use crate::recording::{Campaign, Instrument, Reference, Run};
+use crate::report::calibration::{Calibration, Provenance};
+use crate::report::survey::{Constancy, Radius};
+use crate::report::{EffectReport, Estimate, Status, Tool, provenance};
+
+/// Rows beyond which the jackknife looks at every so many.
+const ENOUGH_ROWS: usize = 3000;
+/// Rows below which a curve tells nothing, fitted and held out.
+const FEWEST_ROWS: usize = 24;
+const FEWEST_HELD_ROWS: usize = 4;
+/// A part of the turn this long without a row leaves an ellipse to be guessed, deg.
+const LARGEST_GAP_DEG: f64 = 180.0;
+/// … and this long, a cubic.
+const LARGEST_GAP_OF_A_CUBIC_DEG: f64 = 60.0;
+/// What the best curve may leave of the radius, rms: engineering choice.
+const LARGEST_LEFT: f64 = 0.25;
+/// Points of a curve in a figure.
+const POINTS: usize = 1500;
+
+/// What two channels told without a reference.
+#[derive(Debug, Clone)]
+pub(crate) struct Told {
+    pub(crate) status: Status,
+    pub(crate) reason: Option<String>,
+    pub(crate) detection_gain_ratio: Option<Estimate>,
+    pub(crate) effects: Vec<EffectReport>,
+    pub(crate) radius: Radius,
+    pub(crate) calibration: Calibration,
+    pub(crate) warnings: Vec<String>,
+    /// points as recorded and with what was found undone, both over the mean radius
+    pub(crate) curve: Curve,
+}
+
+/// Held-out points, as a figure shows them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Curve {
+    /// x and y as recorded, over their mean radius
+    pub before: Vec<[f64; 2]>,
+    /// x and y with what was found undone, over their mean radius
+    pub after: Vec<[f64; 2]>,
+}
+
+/// A sensor with two channels and no reference in any run, or none that is to be used.
+pub(crate) fn serves(campaign: &Campaign) -> bool {
+    let has_reference = campaign.runs.iter().any(|r| r.recording.table_deg.is_some() || r.recording.rate_dps.is_some());
+    campaign.instrument == Instrument::Sensor && (campaign.reference == Some(Reference::Absent) || !has_reference)
+}
+
+/// What the channels tell of themselves.
+///
+/// # Errors
+/// [`Refusal`] where they draw no closed curve.
+pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
+    let device = campaign.device.clone();
+    let provenance = Provenance {
+        tool: Some(Tool::default()),
+        inputs: provenance::sums(&provenance::files(&campaign)),
+        amplitude_v: provenance::amplitudes(&campaign),
+    };
+    let period = campaign.period_deg.unwrap_or(360.0).to_radians();
+    let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
+    let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
+    let (fitted, held) = apart(runs.collect::<Result<_, _>>()?)?;
+    let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
+    if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
+        return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));
+    }
+    let thinned: Vec<SensorRun> = fitted.iter().map(|r| r.thinned((count(&fitted) / ENOUGH_ROWS).max(1))).collect();
+    let rails = Rails::of(fitted.iter().filter_map(SensorRun::channels).flatten());
+    let (readout, predicted, predicted_raw) = choose_readout(&thinned, rails)?;
+    let largest_gap_deg = largest_gap(&readout, &fitted).to_degrees();
+    if largest_gap_deg > LARGEST_GAP_DEG {
+        let what = format!("the channels cover {:.0}° of a turn only", 360.0 - largest_gap_deg);
+        return Err(refuse(what, "rows all around the turn, or a reference: table_deg or rate_dps"));
+    }
+    let deviations = deviations(&readout, &thinned);
+    let plain = Readout { rails, ..Readout::plain() };
+    let (before, after) = (constancy(&plain, &held), constancy(&readout, &held));
+    let neutral = readout.kind == Kind::Plain || after.rms >= before.rms;
+    let evidence = format!(
+        "blocked cross-validation within the fitted rows leaves {predicted:.2e} of the radius with all that was found, \
+         {predicted_raw:.2e} as recorded; interval by jackknife over {BLOCKS} blocks"
+    );
+    let raw_turns = turns(&readout);
+    let values = LibraryReadout::from(&readout).values();
+    let half = STUDENT_19 * deviations[2];
+    let told = !neutral && readout.kind >= Kind::Affine && half.is_finite();
+    let mut hypothesis = Hypothesis::ideal(Instrument::Sensor, period, stated);
+    if !neutral {
+        let member = |(id, origin, values)| Member { id, values, origin, refined: true };
+        hypothesis.members = readout_members(&readout).into_iter().map(member).collect();
+        hypothesis.members.sort_by_key(|m| m.id);
+        hypothesis.clip = clip(&readout);
+    }
+    let calibration = Calibration { device, hypothesis, provenance };
+    calibration_stands(&calibration)?;
+    Ok(Told {
+        status: if neutral { Status::Neutral } else { Status::Answered },
+        reason: neutral.then(|| "nothing that was found makes the radius of held-out rows more constant".to_owned()),
+        detection_gain_ratio: told.then(|| Estimate { value: values[2], ci95: [values[2] - half, values[2] + half] }),
+        effects: if neutral { Vec::new() } else { readout_effects(&readout, deviations, &evidence) },
+        radius: Radius {
+            before,
+            after,
+            correction_rms_deg: raw_turns.then(|| correction(&readout, &held).to_degrees()),
+            largest_gap_deg,
+        },
+        calibration,
+        warnings: unseen(raw_turns, &readout),
+        curve: Curve { before: points(&plain, &held), after: points(&readout, &held) },
+    })
+}
+
+/// Turns of the direction of a run's two channels over those of its reference, about the centre of what they draw; none
+/// where there are no channels, no reference, or no closed curve.
+pub(crate) fn full_turn_gain(run: &Run) -> Option<f64> {
+    let run = SensorRun::new(run.clone(), 0, None).ok()?;
+    let channels = run.channels()?;
+    let one = std::slice::from_ref(&run);
+    let centre = ellipse::algebraic(one)?;
+    if run.travel_rad() < TAU || largest_gap(&centre, one) > LARGEST_GAP_DEG.to_radians() {
+        return None;
+    }
+    let followed = unwrapped(channels.iter().map(|z| centre.angle(*z)), TAU);
+    Some(line(&run.reference_rad, &followed).0)
+}
+
+fn refuse(what: String, wanted: &str) -> Refusal {
+    Refusal::no_answer("campaign", what, wanted)
+}
+
+/// What nobody can see without a reference, in words.
+fn unseen(raw_turns: bool, readout: &Readout) -> Vec<String> {
+    let mut out = vec![
+        "there is no reference: what turns both channels alike is not seen (an eccentric disc or magnet, a lag, the angular \
+         gain, the sense, an error of the angle that repeats with position), so angular_gain and every held-out angle error \
+         are null, and a correction is known to make the radius constant and no more"
+            .to_owned(),
+    ];
+    if readout.kind >= Kind::Affine {
+        out.push(
+            "without a reference unequal gains and unequal cubics of the two channels look alike: the gain ratio is that of \
+             channels with one cubic"
+                .to_owned(),
+        );
+    }
+    if !raw_turns {
+        out.push("the readout's offsets exceed its amplitude, so that the raw angle does not turn".to_owned());
+    }
+    out
+}
+
+/// The simplest readout that predicts the radius of rows it was not fitted to as well as the best does; with the rms that
+/// it leaves, and that of the channels as they are.
+fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64), Refusal> {
+    let no_ellipse = || refuse("the channels draw no ellipse".into(), "two channels that read a cosine and a sine");
+    let start = Readout { rails, ..ellipse::algebraic(runs).ok_or_else(no_ellipse)? };
+    let folds = Folds::interleaved(runs);
+    let fitted = |kind: Kind, runs: &[SensorRun]| {
+        if kind == Kind::Plain {
+            let plain = Readout { rails, ..Readout::plain() };
+            return Some(Readout { radius: mean_radius(&plain, runs), ..plain });
+        }
+        fit(kind, Weighting::Radius, runs, 1.0, &start).map(|f| f.readout)
+    };
+    let gap = largest_gap(&start, runs).to_degrees();
+    let kinds = [Kind::Plain, Kind::Offset, Kind::Affine, Kind::Cubic];
+    let candidates: Vec<Candidate<Kind>> = kinds
+        .into_iter()
+        .filter(|kind| *kind < Kind::Cubic || gap < LARGEST_GAP_OF_A_CUBIC_DEG)
+        .filter_map(|kind| {
+            let losses = losses_of_radius(|fold| fitted(kind, &folds.without(runs, fold)), &folds, runs)?;
+            Some(Candidate { size: kind.free().len(), model: kind, losses })
+        })
+        .collect();
+    let chosen = choose(&candidates).ok_or_else(no_ellipse)?;
+    if chosen.losses.rms() > LARGEST_LEFT {
+        return Err(refuse(
+            format!("the best ellipse leaves {:.2} of the radius", chosen.losses.rms()),
+            "two channels that read a cosine and a sine",
+        ));
+    }
+    let raw = candidates.iter().find(|c| c.model == Kind::Plain).map_or(f64::NAN, |c| c.losses.rms());
+    Ok((fitted(chosen.model, runs).ok_or_else(no_ellipse)?, chosen.losses.rms(), raw))
+}
+
+/// Deviations of a readout's values in the words of the library, by the jackknife.
+fn deviations(readout: &Readout, runs: &[SensorRun]) -> [f64; 6] {
+    if readout.kind == Kind::Plain {
+        return [0.0; 6];
+    }
+    let refit = |block| fit(readout.kind, Weighting::Radius, &without_block(runs, block), 1.0, readout);
+    let fits: Vec<[f64; 6]> =
+        (0..BLOCKS).filter_map(refit).map(|f| LibraryReadout::from(&f.readout).values()).collect();
+    let other = other_noise(readout, runs);
+    std::array::from_fn(|i| jackknife(&fits.iter().map(|f| f[i]).collect::<Vec<_>>()).hypot(other[i] / STUDENT_19))
+}
+
+/// Points of all runs behind the readout; rows at a rail are left out.
+fn undone<'a>(readout: &'a Readout, runs: &'a [SensorRun]) -> impl Iterator<Item = [f64; 2]> + 'a {
+    let rows = runs.iter().filter_map(SensorRun::channels).flatten();
+    rows.filter(|z| !readout.rails.clips(**z)).map(|z| readout.undo(*z))
+}
+
+fn mean_radius(readout: &Readout, runs: &[SensorRun]) -> f64 {
+    let (n, sum) = undone(readout, runs).fold((0.0, 0.0), |(n, sum), [x, y]| (n + 1.0, sum + x.hypot(y)));
+    sum / f64::max(n, 1.0)
+}
+
+fn constancy(readout: &Readout, runs: &[SensorRun]) -> Constancy {
+    let mean = mean_radius(readout, runs);
+    let (n, square, peak) = undone(readout, runs).fold((0.0, 0.0, 0.0f64), |(n, square, peak), [x, y]| {
+        let off = x.hypot(y) / mean - 1.0;
+        (n + 1.0, square + off * off, peak.max(off.abs()))
+    });
+    Constancy { rms: (square / f64::max(n, 1.0)).sqrt(), peak }
+}
+
+/// The largest part of the turn that no row is in, rad.
+fn largest_gap(readout: &Readout, runs: &[SensorRun]) -> f64 {
+    let mut angles: Vec<f64> = undone(readout, runs).map(|[x, y]| y.atan2(x)).collect();
+    angles.sort_by(f64::total_cmp);
+    let ends = angles.first().zip(angles.last()).map_or(TAU, |(first, last)| first + TAU - last);
+    angles.windows(2).map(|w| w[1] - w[0]).fold(ends, f64::max)
+}
+
+/// The origin lies within the curve, so that the angle of the raw channels goes round.
+fn turns(readout: &Readout) -> bool {
+    let [x, y] = readout.undo([0.0, 0.0]);
+    readout.kind == Kind::Plain || x.hypot(y) < readout.radius
+}
+
+/// rms of the angle behind the readout less the raw one, about its mean, rad.
+fn correction(readout: &Readout, runs: &[SensorRun]) -> f64 {
+    let rows = runs.iter().filter_map(SensorRun::channels).flatten();
+    let moved: Vec<f64> = rows.map(|z| wrapped(readout.angle(*z) - z[1].atan2(z[0]), TAU)).collect();
+    let n = moved.len().max(1) as f64;
+    let (sine, cosine) = moved.iter().fold((0.0, 0.0), |(s, c), d| (s + d.sin(), c + d.cos()));
+    let middle = f64::atan2(sine, cosine);
+    (moved.iter().map(|d| wrapped(d - middle, TAU).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+fn points(readout: &Readout, runs: &[SensorRun]) -> Vec<[f64; 2]> {
+    let mean = mean_radius(readout, runs);
+    let all: Vec<[f64; 2]> = undone(readout, runs).collect();
+    all.iter().step_by((all.len() / POINTS).max(1)).map(|[x, y]| [x / mean, y / mean]).collect()
+}
+
+/// Whether a calibration could be read again.
+fn calibration_stands(calibration: &Calibration) -> Result<(), Refusal> {
+    Calibration::from_text(&calibration.to_text(), "the calibration")
+        .map(|_| ())
+        .map_err(|why| refuse(format!("what was found is no calibration: {why}"), "other runs"))
+}

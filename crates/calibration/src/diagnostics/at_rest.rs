@@ -1,0 +1,158 @@
+//! What runs at rest tell: how far the angle wanders, over which time, and how fast it drifts.
+
+use std::f64::consts::PI;
+
+use cvg_model::Envelope;
+use rayon::prelude::*;
+
+use crate::data::track::wrapped;
+use crate::diagnostics::allan::{self, FLICKER, Point};
+use crate::error::Refusal;
+use crate::estimation::statistics::{line, median};
+use crate::recording::{Campaign, Instrument, Run, RunKind};
+use crate::report::{Allan, AllanPoint, Estimate};
+
+/// A time step longer than this many usual ones is a gap.
+const GAP: f64 = 1.5;
+/// Intervals of runs that may be taken together differ by no more than this share.
+const SAME_INTERVAL: f64 = 1e-3;
+/// Angles below which a run tells nothing.
+const FEWEST: usize = 64;
+
+/// A run at rest as stretches without a gap.
+struct AtRest {
+    name: String,
+    interval_s: f64,
+    /// angle, unwrapped, deg
+    stretches: Vec<Vec<f64>>,
+    /// mean rate, deg/s
+    rate_dps: f64,
+    length_s: f64,
+}
+
+/// Takes the runs at rest out of a campaign.
+pub(crate) fn take(campaign: &mut Campaign) -> Vec<Run> {
+    let (at_rest, others) = std::mem::take(&mut campaign.runs).into_iter().partition(|r| r.kind == RunKind::Static);
+    campaign.runs = others;
+    at_rest
+}
+
+/// The Allan deviation of runs at rest, each run's rate with its interval, and what has to be said of them.
+///
+/// # Errors
+/// Where a run is too short, or has no angle.
+pub(crate) fn allan(
+    runs: &[Run],
+    instrument: Instrument,
+    period_deg: Option<f64>,
+) -> Result<(Allan, Vec<Estimate>, Vec<String>), Refusal> {
+    let period = period_deg.unwrap_or(if instrument == Instrument::Sensor { 360.0 } else { 180.0 });
+    let rests: Vec<AtRest> = runs.par_iter().map(|r| AtRest::new(r, period)).collect::<Result<_, _>>()?;
+    let mut warnings = Vec::new();
+    let Some(longest) = rests.iter().max_by(|a, b| a.length_s.total_cmp(&b.length_s)) else {
+        return Err(Refusal::no_answer("campaign", "there is no run at rest", "a run with kind = \"static\""));
+    };
+    let mut stretches = Vec::new();
+    for r in &rests {
+        if (r.interval_s / longest.interval_s - 1.0).abs() < SAME_INTERVAL {
+            stretches.extend(r.stretches.iter().cloned());
+        } else {
+            warnings.push(format!(
+                "{}: sampled every {:.6} s and {} every {:.6} s; the Allan deviation is of the latter",
+                r.name, r.interval_s, longest.name, longest.interval_s
+            ));
+        }
+    }
+    let interval_s = longest.interval_s;
+    let points = allan::overlapping(&stretches, interval_s, &allan::multiples(&stretches));
+    let octaves: Vec<usize> = std::iter::successors(Some(1usize), |m| Some(2 * m))
+        .take_while(|m| points.last().is_some_and(|p| *m as f64 * interval_s <= p.tau_s))
+        .collect();
+    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves));
+    let (bottom, at_the_end) = bottom(&points).ok_or_else(|| {
+        Refusal::no_answer(&longest.name, "the angle at rest does not change at all", "an angle with all its digits")
+    })?;
+    if at_the_end {
+        warnings.push(format!(
+            "the Allan deviation still falls at {:.0} s, the longest time that the runs tell: bias_instability_dph is what \
+             it is at most; a longer run would tell",
+            bottom.tau_s
+        ));
+    }
+    if walk.is_none() {
+        warnings.push("angle_random_walk_deg_sqrt_h is null: no stretch of the Allan deviation falls as 1/√τ".into());
+    }
+    let hour = 3600.0;
+    let dph = |v: f64| v * hour;
+    let allan = Allan {
+        angle_random_walk_deg_sqrt_h: walk.map(|(n, d)| Estimate::new(n * hour.sqrt(), d * hour.sqrt())),
+        bias_instability_dph: Estimate {
+            value: dph(bottom.deviation / FLICKER),
+            ci95: bottom.ci95.map(|v| dph(v / FLICKER)),
+        },
+        bias_instability_tau_s: bottom.tau_s,
+        interval_s,
+        points: points
+            .iter()
+            .map(|p| AllanPoint { tau_s: p.tau_s, deviation_dph: dph(p.deviation), ci95: p.ci95.map(dph) })
+            .collect(),
+    };
+    let wander = points.last().map_or(0.0, |p| p.deviation);
+    let rates = rests.iter().map(|r| Estimate::new(r.rate_dps, wander)).collect();
+    Ok((allan, rates, warnings))
+}
+
+/// The lowest point, and whether the deviation still falls there.
+fn bottom(points: &[Point]) -> Option<(Point, bool)> {
+    let at = (0..points.len()).min_by(|&a, &b| points[a].deviation.total_cmp(&points[b].deviation))?;
+    (points[at].deviation > 0.0).then_some((points[at], at + 1 == points.len()))
+}
+
+impl AtRest {
+    fn new(run: &Run, period_deg: f64) -> Result<Self, Refusal> {
+        let settled = run.settled()?;
+        let r = &run.recording;
+        let name = run.file.display().to_string();
+        let t_s = &r.t_s[settled.clone()];
+        if t_s.len() < FEWEST {
+            return Err(Refusal::no_answer(
+                &name,
+                format!("{} rows at rest are too few for an Allan deviation", t_s.len()),
+                format!("{FEWEST} or more, better hours of them"),
+            ));
+        }
+        let wrapped_deg: Vec<f64> = match (&r.theta_deg, &r.xc_v, &r.yc_v) {
+            (Some(theta), ..) => theta[settled].to_vec(),
+            (None, Some(x), Some(y)) => {
+                let part = |v: &Option<Vec<f64>>, i: usize| v.as_ref().map_or(0.0, |v| v[i]);
+                settled
+                    .map(|i| {
+                        let e = Envelope::new(x[i], part(&r.xs_v, i), y[i], part(&r.ys_v, i));
+                        bearing(&e, period_deg).to_degrees()
+                    })
+                    .collect()
+            }
+            _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
+        };
+        let steps = || t_s.windows(2).map(|w| w[1] - w[0]);
+        let interval_s = median(&mut steps().collect::<Vec<_>>());
+        let mut stretches: Vec<Vec<f64>> = vec![vec![wrapped_deg[0]]];
+        let mut last = wrapped_deg[0];
+        let mut followed = vec![last];
+        for (step, next) in steps().zip(&wrapped_deg[1..]) {
+            last += wrapped(next - last, period_deg);
+            followed.push(last);
+            match stretches.last_mut() {
+                Some(stretch) if step <= GAP * interval_s => stretch.push(last),
+                _ => stretches.push(vec![last]),
+            }
+        }
+        let length_s = t_s[t_s.len() - 1] - t_s[0];
+        Ok(Self { name, interval_s, stretches, rate_dps: line(t_s, &followed).0, length_s })
+    }
+}
+
+/// The angle of an envelope: of the pattern, or of the vector where it goes round once a turn.
+fn bearing(e: &Envelope<f64>, period_deg: f64) -> f64 {
+    if period_deg.to_radians() > 1.5 * PI { e.y_c.atan2(e.x_c) } else { e.pendulum().angle() }
+}
