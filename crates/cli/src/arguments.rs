@@ -35,8 +35,10 @@ Examples:
   cvg identify campaign.toml --out results
   cvg identify 'rot*.csv' --out results             several recordings are a campaign of rotations
   cvg identify rot+500.csv rot-500.csv --holdout rot+350.csv --settle 1
+  cvg identify encoder.csv --sensor --out results  a sin/cos sensor, with a reference or without
   cvg identify export.csv --map t_s=Time --map theta_deg=Ch3 --map rate_dps=Table
   cvg identify export.csv --map 't_s=Time (ms)*0.001' --map xc_v=Ch1 --map yc_v=Ch2 --map table_deg=Pos
+  cvg identify campaign.toml --limits limits.toml  pass or fail on numbers of the report
   gunzip -c rot.csv.gz | cvg identify - --json";
 
 const INSPECT: &str = "\
@@ -50,8 +52,15 @@ const COMPENSATE: &str = "\
 Examples:
   cvg compensate results/calibration.toml rot.csv --out clean.csv
   cvg compensate results/calibration.toml rot.parquet --out clean.parquet
+  cvg compensate results/calibration.toml 'rot*.csv' --out clean --device dfp-7
   cvg compensate results/calibration.toml - --out clean.csv < rot.csv
   cvg compensate results/calibration.toml export.csv --map campaign.toml --out clean.csv";
+
+const COMPARE: &str = "\
+Examples:
+  cvg compare before after                          two folders of results
+  cvg compare monday/report.json friday/report.json --json
+  cvg compare a/calibration.toml b/calibration.toml values alone: a calibration has no intervals";
 
 const COMPLETIONS: &str = "\
 Examples:
@@ -156,17 +165,39 @@ pub(crate) enum Command {
         /// Seconds to drop at the start of each recording; a campaign.toml says that itself
         #[arg(long, value_name = "SECONDS")]
         settle: Option<f64>,
+        /// Two channels that read a sine and a cosine, and no gyroscope: instrument = "sensor", with a period of 360°
+        #[arg(long)]
+        sensor: bool,
+        /// Limits of numbers of the report (TOML); a line each, and exit status 1 where one fails
+        #[arg(long, value_name = "LIMITS")]
+        limits: Option<PathBuf>,
     },
-    /// Take the identified errors out of a recording
+    /// Say which parameters of two answers moved beyond their combined 95 % intervals
+    #[command(after_help = COMPARE)]
+    Compare {
+        /// report.json, a folder of results, or calibration.toml
+        a: PathBuf,
+        /// The same of another day or device
+        b: PathBuf,
+        /// Print the comparison as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Take the identified errors out of recordings
     #[command(after_help = COMPENSATE)]
     Compensate {
         /// calibration.toml from `cvg identify`
         calibration: PathBuf,
-        /// Recording (CSV, Parquet, .mat, HDF5); - for standard input
-        recording: PathBuf,
-        /// File for the compensated recording (CSV, or Parquet where the name ends in .parquet)
+        /// Recordings (CSV, Parquet, .mat, HDF5); patterns like 'rot*.csv'; - for standard input
+        #[arg(required = true, value_name = "RECORDING")]
+        recordings: Vec<PathBuf>,
+        /// File for the compensated recording (CSV, or Parquet where the name ends in .parquet); a folder for several, which
+        /// keep their names
         #[arg(long)]
         out: PathBuf,
+        /// Name of the instrument of the recordings; refused where the calibration is of another
+        #[arg(long)]
+        device: Option<String>,
         #[command(flatten)]
         mapping: Mapping,
     },

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::{Campaign, Naming};
+use cvg_calibration::recording::Campaign;
 use cvg_calibration::report::refused::{About, Refused};
-use cvg_calibration::{Cause, Identification, Options, Refusal};
+use cvg_calibration::{Answer, Cause, Identification, Options};
 use cvg_simulator::{Scenario, ScenarioError};
 
 use crate::arguments::Arguments;
+use crate::limits::Limits;
 use crate::progress::Progress;
 use crate::{Failure, input, output, report};
 
@@ -46,6 +47,7 @@ pub(crate) fn identify(
     open: impl FnOnce() -> Result<Campaign, Failure>,
     out: Option<&Path>,
     json: bool,
+    limits: Option<&Limits>,
 ) -> Result<(), Failure> {
     out.map_or(Ok(()), output::check_folder)?;
     let progress = Progress::begin();
@@ -54,8 +56,9 @@ pub(crate) fn identify(
     let inputs = input::sources(&opened);
     out.map_or(Ok(()), |out| output::check_folder_for(out, &RESULTS, &inputs))?;
     let about = About::campaign(&opened);
-    let identified = match identified(opened, &progress) {
-        Ok(identified) => identified,
+    let options = Options { discover: true, progress: &|what| progress.say(what) };
+    let told = match cvg_calibration::answer(opened, &options) {
+        Ok(answer) => Told::of(&answer)?,
         Err(refusal) => {
             drop(progress);
             if refusal.cause == Cause::NoAnswer {
@@ -66,17 +69,57 @@ pub(crate) fn identify(
     };
     drop(progress);
     if let Some(out) = out {
-        let results = results(&identified)?;
-        let files: Vec<_> = RESULTS.into_iter().zip(results.iter().map(String::as_bytes)).collect();
-        output::write_all(out, &files, &inputs)?;
+        let [report, page, calibration] = RESULTS;
+        let mut set = output::Set::begin(out, &inputs)?;
+        set.add(report, told.json.as_bytes())?;
+        set.add(page, told.page.as_bytes())?;
+        match &told.calibration {
+            Some(text) => set.add(calibration, text.as_bytes())?,
+            None => set.take_away(&[calibration]),
+        }
+        set.commit()?;
         output::tell(format_args!("wrote {}", out.join("report.html").display()));
     }
     if json {
-        output::answer(&format!("{}\n", report_json(&identified)?))?;
+        output::answer(&format!("{}\n", told.json))?;
     } else {
-        output::answer(&summary(&identified))?;
+        output::answer(&told.summary)?;
     }
-    identified.report.reason.map_or(Ok(()), |reason| Err(Failure::no_answer(reason)))
+    let facts = serde_json::from_str(&told.json).map_err(Failure::input)?;
+    let outside = limits.map_or(Ok(None), |limits| limits.judge(&told.device, &facts))?;
+    told.reason.or(outside).map_or(Ok(()), |reason| Err(Failure::no_answer(reason)))
+}
+
+/// An answer as it is handed out.
+struct Told {
+    device: String,
+    json: String,
+    page: String,
+    calibration: Option<String>,
+    summary: String,
+    /// why nothing is undone, where nothing is
+    reason: Option<String>,
+}
+
+impl Told {
+    fn of(answer: &Answer) -> Result<Self, Failure> {
+        match answer {
+            Answer::Identified(identified) => {
+                let [json, page, calibration] = results(identified)?;
+                let reason = identified.report.reason.clone();
+                let device = identified.report.device.clone();
+                Ok(Self { device, json, page, calibration: Some(calibration), summary: summary(identified), reason })
+            }
+            Answer::Surveyed(surveyed) => Ok(Self {
+                device: surveyed.report.device.clone(),
+                json: serde_json::to_string_pretty(&surveyed.report).map_err(Failure::input)?,
+                page: report::survey::page(surveyed)?,
+                calibration: surveyed.calibration.as_ref().map(Calibration::to_text),
+                summary: report::survey::summary(&surveyed.report),
+                reason: surveyed.report.reason.clone(),
+            }),
+        }
+    }
 }
 
 /// Says in report.json that there is no answer. What an earlier identification left beside it is not of this campaign, and
@@ -98,12 +141,8 @@ fn refuse(refused: &Refused, out: Option<&Path>, inputs: &[PathBuf], json: bool)
 pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Identification, Failure> {
     let progress = Progress::begin();
     progress.say("reading");
-    Ok(identified(open()?, &progress)?)
-}
-
-fn identified(campaign: Campaign, progress: &Progress) -> Result<Identification, Refusal> {
     let options = Options { discover: true, progress: &|what| progress.say(what) };
-    cvg_calibration::identify_with_picture(campaign, &options)
+    Ok(cvg_calibration::identify_with_picture(open()?, &options)?)
 }
 
 /// Names of the results.
@@ -117,29 +156,6 @@ pub(crate) fn results(identified: &Identification) -> Result<[String; 3], Failur
 /// report.json
 pub(crate) fn report_json(identified: &Identification) -> Result<String, Failure> {
     serde_json::to_string_pretty(&identified.report).map_err(Failure::input)
-}
-
-/// `cvg compensate`
-pub(crate) fn compensate(calibration: &Path, recording: &Path, out: &Path, naming: &Naming) -> Result<(), Failure> {
-    let inputs = [calibration.to_owned(), recording.to_owned()];
-    output::check_file(out, &inputs)?;
-    let calibration = Calibration::read(calibration)?;
-    let recording = input::recording(recording, naming)?;
-    recording.require_rotation()?;
-    for w in &recording.warnings {
-        output::tell(format_args!("warning: {w}"));
-    }
-    let compensated = cvg_calibration::compensate(&calibration, &recording)?;
-    let mut bytes = Vec::new();
-    if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
-        compensated.write_parquet(&mut bytes)
-    } else {
-        compensated.write_csv(&mut bytes)
-    }
-    .map_err(|e| Failure::input(format!("{}: {e}", out.display())))?;
-    output::write(out, &bytes, &inputs)?;
-    output::tell(format_args!("wrote {}", out.display()));
-    Ok(())
 }
 
 /// `cvg man`: a manual page for the program and for each of its commands.
@@ -196,6 +212,9 @@ pub(crate) fn summary(identified: &Identification) -> String {
         let n = u.n.map(|n| format!(" n = {n}")).unwrap_or_default();
         let f = u.frequency_hz.map(|f| format!(" {f:.4} Hz")).unwrap_or_default();
         line(format!("  unexplained {}{n}{f}: {:.5}° rms; {}", u.class, u.rms_deg, u.suggestion));
+    }
+    if let Some(allan) = &r.allan {
+        report::survey::allan_in_words(allan).into_iter().for_each(&mut line);
     }
     for w in &r.warnings {
         line(format!("  warning: {w}"));

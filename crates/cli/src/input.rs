@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Naming, ReadError, Recording, Role};
+use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, Role};
 
 use crate::Failure;
 
@@ -93,13 +93,29 @@ pub(crate) fn sources(campaign: &Campaign) -> Vec<PathBuf> {
     std::iter::once(campaign.source.clone()).chain(runs).filter(|path| !path.as_os_str().is_empty()).collect()
 }
 
+/// What the command line says of a campaign beside its files.
+pub(crate) struct Wanted<'a> {
+    pub(crate) naming: &'a Naming,
+    /// recordings that nothing is fitted to
+    pub(crate) holdout: &'a [PathBuf],
+    /// time to drop at the start of each
+    pub(crate) settle_s: Option<f64>,
+    /// an angle sensor, whatever a campaign file says
+    pub(crate) sensor: bool,
+}
+
 /// Opens a campaign file, or makes a campaign of recordings.
-pub(crate) fn campaign(
-    names: &[PathBuf],
-    naming: &Naming,
-    holdout: &[PathBuf],
-    settle_s: Option<f64>,
-) -> Result<Campaign, Failure> {
+pub(crate) fn campaign(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
+    let mut campaign = opened(names, wanted)?;
+    if wanted.sensor {
+        campaign.period_deg.get_or_insert(360.0);
+    }
+    Ok(campaign)
+}
+
+fn opened(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
+    let &Wanted { naming, holdout, settle_s, sensor } = wanted;
+    let instrument = sensor.then_some(Instrument::Sensor);
     let (fitted, held) = (files(names)?, files(holdout)?);
     if let Some(file) = fitted.iter().chain(&held).find(|p| is_campaign(p)) {
         if fitted.len() > 1 || !held.is_empty() || settle_s.is_some() {
@@ -108,7 +124,7 @@ pub(crate) fn campaign(
                 file.display()
             )));
         }
-        return Campaign::open_named(file, naming).map_err(explained);
+        return Campaign::open_as(file, naming, instrument).map_err(explained);
     }
     if let Some(file) = held.iter().find(|p| fitted.contains(p)) {
         return Err(Failure::input(format!("{}: cannot be fitted to and held out at once", file.display())));
@@ -126,7 +142,7 @@ pub(crate) fn campaign(
             still.source.display()
         )));
     }
-    let mut campaign = Campaign::of_recordings(read).map_err(explained)?;
+    let mut campaign = Campaign::of_recordings_as(read, instrument.unwrap_or_default()).map_err(explained)?;
     for (number, run) in campaign.runs.iter_mut().enumerate() {
         run.settle_s = settle_s;
         if number >= fitted.len() {
@@ -149,6 +165,12 @@ pub(crate) fn explained(error: ReadError) -> Failure {
     let (ReadError::MissingColumns { present, .. } | ReadError::MappedColumn { present, .. }) = &error else {
         return Failure::input(error);
     };
+    let there = |name: &str| present.split('`').any(|p| p == name);
+    if there("xc_v") && there("yc_v") && there("t_s") {
+        return Failure::input(format!(
+            "{error}; a sin/cos sensor needs no reference: --sensor, or instrument = \"sensor\" in a campaign.toml"
+        ));
+    }
     let known = |name: &str| Channel::ALL.iter().any(|c| c.name().eq_ignore_ascii_case(name));
     let foreign = present.split('`').skip(1).step_by(2).find(|name| !known(name)).unwrap_or("Ch3");
     let channel = if foreign.to_lowercase().starts_with('t') { "t_s" } else { "theta_deg" };

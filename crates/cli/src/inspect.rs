@@ -159,7 +159,11 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
     };
     let d = &recording.dropped;
     let (duration, interval, largest) = timing(&recording.t_s);
-    let kind = kind.map_or("", |k| if k == RunKind::Rotation { ", a rotation" } else { ", a ring-down" });
+    let kind = kind.map_or("", |k| match k {
+        RunKind::Rotation => ", a rotation",
+        RunKind::Ringdown { .. } => ", a ring-down",
+        RunKind::Static => ", at rest",
+    });
     line(format!("{}{kind}", recording.source.display()));
     line(format!(
         "  {} rows over {duration:.3} s, one every {:.6} s ({:.2} Hz), largest gap {largest:.6} s; {} rows dropped",

@@ -7,11 +7,14 @@
 mod arguments;
 mod clouds;
 mod commands;
+mod compare;
+mod compensate;
 mod demo;
 mod figure;
 mod input;
 mod inspect;
 mod library;
+mod limits;
 mod output;
 mod paper;
 mod progress;
@@ -71,12 +74,15 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Inspect { files, mapping, plot, json } => {
             inspect::inspect(&files, &mapping.naming()?, plot.as_deref(), json)
         }
-        Command::Identify { campaign, out, json, mapping, holdout, settle } => {
+        Command::Identify { campaign, out, json, mapping, holdout, settle, sensor, limits } => {
             let naming = mapping.naming()?;
-            commands::identify(|| input::campaign(&campaign, &naming, &holdout, settle), out.as_deref(), json)
+            let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
+            let wanted = input::Wanted { naming: &naming, holdout: &holdout, settle_s: settle, sensor };
+            commands::identify(|| input::campaign(&campaign, &wanted), out.as_deref(), json, limits.as_ref())
         }
-        Command::Compensate { calibration, recording, out, mapping } => {
-            commands::compensate(&calibration, &recording, &out, &mapping.naming()?)
+        Command::Compare { a, b, json } => compare::compare(&a, &b, json),
+        Command::Compensate { calibration, recordings, out, device, mapping } => {
+            compensate::compensate(&calibration, &recordings, &out, device.as_deref(), &mapping.naming()?)
         }
         Command::Effects { effect, json, markdown } => library::effects(effect.as_deref(), json, markdown),
         Command::Paper { out } => paper::paper(&out),

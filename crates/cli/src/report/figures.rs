@@ -21,7 +21,7 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    fn new(id: &str, title: &str, caption: impl Into<String>, traces: Vec<Value>, layout: Value) -> Self {
+    pub(super) fn new(id: &str, title: &str, caption: impl Into<String>, traces: Vec<Value>, layout: Value) -> Self {
         let (id, title, caption) = (id.into(), title.into(), caption.into());
         Self { id, title, caption, wide: false, toggles: Vec::new(), traces, layout }
     }
@@ -68,11 +68,11 @@ fn short(value: f64) -> Value {
     json!(rounded)
 }
 
-fn shorts(values: impl IntoIterator<Item = f64>) -> Value {
+pub(super) fn shorts(values: impl IntoIterator<Item = f64>) -> Value {
     values.into_iter().map(short).collect()
 }
 
-fn axis(title: &str) -> Value {
+pub(super) fn axis(title: &str) -> Value {
     json!({"title": {"text": title}})
 }
 

@@ -5,6 +5,7 @@
 
 mod figures;
 mod finding;
+pub(crate) mod survey;
 mod tables;
 
 use std::fmt::Write as _;
@@ -29,6 +30,26 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     let r = &identified.report;
     let figures = figures::all(identified);
     let mut h = String::with_capacity(6 << 20);
+    begin(&mut h, &r.device, &r.instrument);
+    headline(&mut h, identified);
+    warnings(&mut h, &r.warnings);
+    stages(&mut h, identified);
+    h.push_str(
+        "<nav aria-label=\"sections\"><a href=\"#look\">Figures</a><a href=\"#parameters\">Parameters</a><a \
+         href=\"#effects\">Effects</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
+         href=\"#files\">Files</a></nav></header><main>",
+    );
+    let still = clouds::bias_svg(identified, STILL_POINTS, true)?;
+    let without = "<p>The figures need scripts, which this file brings along; here is one without.</p>";
+    draw(&mut h, &format!("{without}{still}"), &figures);
+    tables::all(&mut h, identified);
+    let footer = "Errors are angle minus the best line, angular gain and bias refitted on the same held-out samples.";
+    finish(&mut h, &commands::report_json(identified)?, &r.schema, footer, &figures)?;
+    Ok(h)
+}
+
+/// The page up to its first words.
+fn begin(h: &mut String, device: &str, instrument: &str) {
     let _ = write!(
         h,
         "<!doctype html>\n<html lang=\"en\" data-theme=\"light\"><head><meta charset=\"utf-8\"><meta \
@@ -36,27 +57,20 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
          content=\"width=device-width,initial-scale=1\"><title>{0}: cvg report</title><style>{STYLE}</style></head><body>\
          <header><div class=\"bar\"><h1>{0} · {1}</h1><button id=\"theme\" type=\"button\" hidden \
          aria-label=\"switch between light and dark\">Dark</button></div>",
-        escape(&r.device),
-        escape(&r.instrument)
+        escape(device),
+        escape(instrument)
     );
-    headline(&mut h, identified);
-    warnings(&mut h, identified);
-    stages(&mut h, identified);
-    h.push_str(
-        "<nav aria-label=\"sections\"><a href=\"#look\">Figures</a><a href=\"#parameters\">Parameters</a><a \
-         href=\"#effects\">Effects</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
-         href=\"#files\">Files</a></nav></header><main>",
-    );
-    draw(&mut h, identified, &figures)?;
-    tables::all(&mut h, identified);
+}
+
+/// The facts for programs, the footer, and what the figures are drawn from.
+fn finish(h: &mut String, json: &str, schema: &str, footer: &str, figures: &[Figure]) -> Result<(), Failure> {
     let _ = write!(
         h,
         "<details><summary>report.json</summary><div class=\"scroll\" tabindex=\"0\"><pre>{}</pre></div></details></main>\
-         <footer>cvg {}, schema {}. Errors are angle minus the best line, angular gain and bias refitted on the same \
-         held-out samples.</footer>",
-        escape(&commands::report_json(identified)?),
+         <footer>cvg {}, schema {}. {footer}</footer>",
+        escape(json),
         env!("CARGO_PKG_VERSION"),
-        escape(&r.schema)
+        escape(schema)
     );
     let data: Vec<Value> = figures.iter().map(Figure::data).collect();
     let data = serde_json::to_string(&data).map_err(Failure::input)?;
@@ -67,7 +81,7 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
         data.replace('<', "\\u003c"),
         plotly_script()
     );
-    Ok(h)
+    Ok(())
 }
 
 /// Plotly alone; the formula renderer that the crate puts behind it is not needed.
@@ -90,8 +104,7 @@ fn headline(h: &mut String, identified: &Identification) {
     );
 }
 
-fn warnings(h: &mut String, identified: &Identification) {
-    let list = &identified.report.warnings;
+fn warnings(h: &mut String, list: &[String]) {
     if list.is_empty() {
         return;
     }
@@ -116,17 +129,14 @@ fn stages(h: &mut String, identified: &Identification) {
     h.push_str("</div>");
 }
 
-fn draw(h: &mut String, identified: &Identification, figures: &[Figure]) -> Result<(), Failure> {
+/// The figures; `still` is for readers without scripts.
+fn draw(h: &mut String, still: &str, figures: &[Figure]) {
     h.push_str(
         "<h2 id=\"look\">Figures</h2><p class=\"keys\">Drag to zoom, double-click to reset, point to read off. With the \
          keyboard: focus a figure; <kbd>←</kbd> <kbd>→</kbd> <kbd>↑</kbd> <kbd>↓</kbd> move, <kbd>+</kbd> <kbd>-</kbd> \
          zoom, <kbd>0</kbd> shows all.</p>",
     );
-    let _ = write!(
-        h,
-        "<noscript><p>The figures need scripts, which this file brings along; here is one without.</p>{}</noscript>",
-        clouds::bias_svg(identified, STILL_POINTS, true)?
-    );
+    let _ = write!(h, "<noscript>{still}</noscript>");
     h.push_str("<div class=\"figures\">");
     for f in figures {
         let id = escape(&f.id);
@@ -153,7 +163,6 @@ fn draw(h: &mut String, identified: &Identification, figures: &[Figure]) -> Resu
         );
     }
     h.push_str("</div>");
-    Ok(())
 }
 
 fn escape(text: &str) -> String {

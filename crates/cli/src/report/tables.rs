@@ -25,7 +25,7 @@ pub(super) fn all(h: &mut String, identified: &Identification) {
 }
 
 /// A table with a header; `rows` writes its rows.
-fn table(h: &mut String, label: &str, columns: &[&str], rows: impl FnOnce(&mut String)) {
+pub(super) fn table(h: &mut String, label: &str, columns: &[&str], rows: impl FnOnce(&mut String)) {
     let _ = write!(
         h,
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
@@ -39,7 +39,7 @@ fn table(h: &mut String, label: &str, columns: &[&str], rows: impl FnOnce(&mut S
     h.push_str("</tbody></table></div>");
 }
 
-fn row(h: &mut String, cells: &[&str]) {
+pub(super) fn row(h: &mut String, cells: &[&str]) {
     h.push_str("<tr>");
     for (i, c) in cells.iter().enumerate() {
         let class = if i == 0 || c.len() > 60 { "" } else { " class=\"n\"" };

@@ -1,0 +1,197 @@
+//! `cvg compare`: which parameters moved beyond what both answers leave open: before and after, two devices, today and last
+//! month.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use cvg_calibration::calibration::Calibration;
+use serde_json::{Value, json};
+
+use crate::commands::significant;
+use crate::{Failure, output};
+
+/// A parameter of one answer.
+#[derive(Debug, Clone, PartialEq)]
+struct Parameter {
+    name: String,
+    unit: String,
+    value: f64,
+    ci95: Option<[f64; 2]>,
+}
+
+/// A parameter of both answers, or of one.
+struct Pair {
+    name: String,
+    unit: String,
+    of: [Option<Parameter>; 2],
+}
+
+/// Estimates at the top of a report, and the unit of each.
+const ESTIMATES: [(&str, &str); 7] = [
+    ("/angular_gain", "1"),
+    ("/detection_gain_ratio", "1"),
+    ("/actuation_gain_ratio", "1"),
+    ("/scale_factor/nonlinearity_ppm", "ppm"),
+    ("/scale_factor/asymmetry_ppm", "ppm"),
+    ("/allan/angle_random_walk_deg_sqrt_h", "deg/√h"),
+    ("/allan/bias_instability_dph", "deg/h"),
+];
+
+/// Compares two answers.
+pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
+    let pairs = paired(parameters(a)?, parameters(b)?);
+    if json {
+        let list: Vec<Value> = pairs.iter().map(Pair::as_value).collect();
+        let moved = pairs.iter().filter(|p| p.moved() == Some(true)).count();
+        let facts =
+            json!({"a": a.display().to_string(), "b": b.display().to_string(), "moved": moved, "parameters": list});
+        let text = serde_json::to_string_pretty(&facts).map_err(Failure::input)?;
+        return output::answer(&format!("{text}\n"));
+    }
+    output::answer(&in_words(&pairs))
+}
+
+/// The parameters of a report, of the report in a folder, or of a calibration.
+fn parameters(path: &Path) -> Result<Vec<Parameter>, Failure> {
+    let bad = |what: String| {
+        let wanted = "report.json, a folder with one, or calibration.toml, as cvg identify writes them";
+        Failure::input(format!("{}: {what}; wanted {wanted}", path.display()))
+    };
+    let file = if path.is_dir() { path.join("report.json") } else { path.to_owned() };
+    if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        return Ok(of_calibration(&Calibration::read(&file)?));
+    }
+    let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
+    let report: Value = serde_json::from_str(&text).map_err(|e| bad(format!("is no report: {e}")))?;
+    if !report["schema"].as_str().is_some_and(|s| s.starts_with("cvg.report/")) {
+        return Err(bad("is no report".into()));
+    }
+    if report["status"] == "refused" {
+        return Err(bad("has no answer (refused)".into()));
+    }
+    Ok(of_report(&report))
+}
+
+fn of_report(report: &Value) -> Vec<Parameter> {
+    let mut out: Vec<Parameter> = ESTIMATES
+        .iter()
+        .filter_map(|(at, unit)| parameter(at.trim_start_matches('/').replace('/', "."), unit, report.pointer(at)?))
+        .collect();
+    let list = |v: &Value| v.as_array().cloned().unwrap_or_default();
+    for effect in list(&report["effects"]) {
+        let id = effect["id"].as_str().unwrap_or_default();
+        let parameters = list(&effect["parameters"]);
+        // effects of a searched number may be there more than once
+        let number = parameters.iter().find(|p| p["name"] == "n").and_then(|p| p["value"].as_f64());
+        let id = number.map_or(id.to_owned(), |n| format!("{id}[{n}]"));
+        let name = |p: &Value| format!("{id}.{}", p["name"].as_str().unwrap_or_default());
+        out.extend(parameters.iter().filter_map(|p| parameter(name(p), p["unit"].as_str().unwrap_or("1"), p)));
+    }
+    for run in list(&report["runs"]) {
+        let file = run["file"].as_str().unwrap_or_default();
+        out.extend(parameter(format!("{file}.tau_s"), "s", &run["tau_s"]));
+    }
+    out
+}
+
+fn parameter(name: String, unit: &str, value: &Value) -> Option<Parameter> {
+    let ends = [&value["ci95"][0], &value["ci95"][1]].map(Value::as_f64);
+    let ci95 = ends[0].zip(ends[1]).map(|(low, high)| [low, high]);
+    Some(Parameter { name, unit: unit.to_owned(), value: value["value"].as_f64()?, ci95 })
+}
+
+fn of_calibration(calibration: &Calibration) -> Vec<Parameter> {
+    let h = &calibration.hypothesis;
+    let bare = |name: String, unit: &str, value: f64| Parameter { name, unit: unit.to_owned(), value, ci95: None };
+    let mut out = vec![bare("angular_gain".into(), "1", h.angular_gain)];
+    for m in &h.members {
+        let parameters = m.id.description().parameters.iter().zip(m.values);
+        out.extend(parameters.map(|(p, v)| bare(format!("{}.{}", m.id, p.name), p.unit, v)));
+    }
+    out
+}
+
+fn paired(a: Vec<Parameter>, mut b: Vec<Parameter>) -> Vec<Pair> {
+    let mut out: Vec<Pair> = Vec::new();
+    for one in a {
+        let other = b.iter().position(|p| p.name == one.name).map(|at| b.remove(at));
+        out.push(Pair { name: one.name.clone(), unit: one.unit.clone(), of: [Some(one), other] });
+    }
+    out.extend(b.into_iter().map(|p| Pair { name: p.name.clone(), unit: p.unit.clone(), of: [None, Some(p)] }));
+    out
+}
+
+impl Pair {
+    fn difference(&self) -> Option<f64> {
+        let [a, b] = &self.of;
+        let d = b.as_ref()?.value - a.as_ref()?.value;
+        // a phase goes round
+        Some(if self.unit == "deg" { d - 360.0 * (d / 360.0).round() } else { d })
+    }
+
+    /// Half width of the difference's interval: that of either value towards the other, in quadrature.
+    fn combined(&self) -> Option<f64> {
+        let [a, b] = &self.of;
+        let (a, b) = (a.as_ref()?, b.as_ref()?);
+        let up = self.difference()? >= 0.0;
+        let side = |p: &Parameter, up: bool| p.ci95.map(|[low, high]| if up { high - p.value } else { p.value - low });
+        Some(side(a, up)?.hypot(side(b, !up)?))
+    }
+
+    /// Whether it moved beyond what both leave open; none where one of them has no interval, or did not tell it.
+    fn moved(&self) -> Option<bool> {
+        Some(self.difference()?.abs() > self.combined()?)
+    }
+
+    /// What came of it, in a word or two.
+    fn verdict(&self) -> &'static str {
+        match (&self.of, self.moved()) {
+            ([Some(_), None], _) => "only in A",
+            ([None, _], _) => "only in B",
+            (_, Some(true)) => "moved",
+            (_, Some(false)) => "",
+            (_, None) if self.difference() == Some(0.0) => "the same",
+            (_, None) => "differs, no interval",
+        }
+    }
+
+    fn as_value(&self) -> Value {
+        let of = |p: &Option<Parameter>| p.as_ref().map(|p| json!({"value": p.value, "ci95": p.ci95}));
+        json!({"name": self.name, "unit": self.unit, "a": of(&self.of[0]), "b": of(&self.of[1]),
+               "difference": self.difference(), "combined95": self.combined(), "moved": self.moved()})
+    }
+}
+
+fn in_words(pairs: &[Pair]) -> String {
+    let columns = ["parameter", "A", "B", "B − A", "± 95 %", "unit", ""].map(str::to_owned);
+    let value = |v: Option<f64>| v.map_or("—".to_owned(), significant);
+    let mut rows = vec![columns];
+    rows.extend(pairs.iter().map(|p| {
+        let of = |i: usize| value(p.of[i].as_ref().map(|p| p.value));
+        let brief = |v: Option<f64>| v.map_or("—".to_owned(), |v| format!("{v:.2e}"));
+        let words = [of(0), of(1), brief(p.difference()), brief(p.combined()), p.unit.clone(), p.verdict().to_owned()];
+        let [a, b, d, c, unit, verdict] = words;
+        [p.name.clone(), a, b, d, c, unit, verdict]
+    }));
+    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..7).map(width).collect();
+    let mut s = String::new();
+    for row in &rows {
+        let cells: Vec<String> = row
+            .iter()
+            .zip(&widths)
+            .enumerate()
+            .map(|(c, (cell, &w))| {
+                let pad = " ".repeat(w - cell.chars().count());
+                if c == 0 || c > 4 { format!("{cell}{pad}") } else { format!("{pad}{cell}") }
+            })
+            .collect();
+        let _ = writeln!(s, "{}", cells.join("  ").trim_end());
+    }
+    let moved: Vec<&str> = pairs.iter().filter(|p| p.moved() == Some(true)).map(|p| p.name.as_str()).collect();
+    let _ = match moved.as_slice() {
+        [] => writeln!(s, "nothing moved beyond the combined 95 % intervals"),
+        names => writeln!(s, "moved beyond the combined 95 % intervals: {}", names.join(", ")),
+    };
+    s
+}

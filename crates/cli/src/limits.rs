@@ -1,0 +1,157 @@
+//! `--limits`: pass or fail on any number of the report.
+//!
+//! A number is named by its place in report.json, keys joined by dots. An element of a list is named by its number from 0,
+//! or by its `id`, `name`, `file`, `of` or `channel`: `effects.detection-cubic.parameters.kappa.value`, `effects[0].id`.
+
+use std::path::Path;
+
+use cvg_model::effects::EffectId;
+use serde_json::Value;
+use toml::Table;
+
+use crate::{Failure, output};
+
+/// What an element of a list is called by.
+const NAMES: [&str; 5] = ["id", "name", "file", "of", "channel"];
+const WANTED: &str =
+    "a number of report.json with min, max or both, as in \"heldout.discovered.rms_deg\" = { max = 0.01 }";
+
+/// Limits of a report.
+#[derive(Debug, Default)]
+pub(crate) struct Limits(Vec<Limit>);
+
+/// One number, and what it has to be between.
+#[derive(Debug)]
+struct Limit {
+    path: String,
+    min: Option<f64>,
+    max: Option<f64>,
+}
+
+/// What stands at a place of a report.
+enum Found {
+    Number(f64),
+    Null,
+    Nothing,
+}
+
+impl Limits {
+    /// Reads a limits file.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let bad = |what: String| Failure::input(format!("{}: {what}; wanted {WANTED}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
+        let table: Table = text
+            .parse()
+            .map_err(|e: toml::de::Error| bad(e.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
+        let mut limits = Self::default();
+        limits.add(&table, "").map_err(bad)?;
+        if limits.0.is_empty() { Err(bad("there is no limit".into())) } else { Ok(limits) }
+    }
+
+    /// The limits in a table; `above` is where it stands.
+    fn add(&mut self, table: &Table, above: &str) -> Result<(), String> {
+        for (key, value) in table {
+            let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
+            let Some(inner) = value.as_table() else { return Err(format!("`{path}` is no table")) };
+            let ends = inner.iter().all(|(k, v)| (k == "min" || k == "max") && !v.is_table());
+            if !ends {
+                self.add(inner, &path)?;
+                continue;
+            }
+            let number = |key: &str| {
+                let wrong = || format!("`{path}`: `{key}` is no number");
+                let as_number = |v: &toml::Value| {
+                    #[allow(clippy::cast_precision_loss, reason = "limits are small numbers")]
+                    let number = v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+                    number.filter(|n| !n.is_nan()).ok_or_else(wrong)
+                };
+                inner.get(key).map(as_number).transpose()
+            };
+            let (min, max) = (number("min")?, number("max")?);
+            if min.is_none() && max.is_none() {
+                return Err(format!("`{path}` has neither min nor max"));
+            }
+            if min.zip(max).is_some_and(|(min, max)| min > max) {
+                return Err(format!("`{path}`: min is above max"));
+            }
+            self.0.push(Limit { path, min, max });
+        }
+        Ok(())
+    }
+
+    /// Judges a report, a line each on standard error; why it fails, where it does.
+    ///
+    /// # Errors
+    /// Bad use where a limit names no number of the report.
+    pub(crate) fn judge(&self, device: &str, report: &Value) -> Result<Option<String>, Failure> {
+        let mut failed = Vec::new();
+        for limit in &self.0 {
+            let (passes, value) = match find(report, &limit.path.replace('[', ".").replace(']', "")) {
+                Found::Number(value) => (limit.holds(value), value.to_string()),
+                Found::Null => (false, "not told".to_owned()),
+                Found::Nothing => {
+                    let what = format!("--limits: `{}` names no number of the report; wanted {WANTED}", limit.path);
+                    return Err(Failure::input(what));
+                }
+            };
+            let word = if passes { "pass" } else { "FAIL" };
+            output::tell(format_args!("{word}  {device}  {} = {value}  ({})", limit.path, limit.in_words()));
+            if !passes {
+                failed.push(limit.path.as_str());
+            }
+        }
+        Ok((!failed.is_empty()).then(|| format!("{device}: outside its limits: {}", failed.join(", "))))
+    }
+}
+
+impl Limit {
+    fn holds(&self, value: f64) -> bool {
+        self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max)
+    }
+
+    fn in_words(&self) -> String {
+        let end = |word: &str, v: Option<f64>| v.map(|v| format!("{word} {v}"));
+        [end("min", self.min), end("max", self.max)].into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// What stands at a place. Keys may hold dots themselves, as files do: the shortest key that leads on is taken.
+fn find(value: &Value, path: &str) -> Found {
+    if path.is_empty() {
+        return match value {
+            Value::Number(n) => n.as_f64().map_or(Found::Nothing, Found::Number),
+            Value::Null => Found::Null,
+            _ => Found::Nothing,
+        };
+    }
+    if value.is_null() {
+        return Found::Null;
+    }
+    for end in path.match_indices('.').map(|(at, _)| at).chain([path.len()]) {
+        let (key, rest) = (&path[..end], path[end..].trim_start_matches('.'));
+        let Some(next) = step(value, key) else { continue };
+        match find(next, rest) {
+            Found::Nothing => {}
+            found => return found,
+        }
+    }
+    // an effect of the library that this instrument does not show
+    let effects = |v: &Value| v.as_array().is_some_and(|v| v.iter().all(|e| e.get("evidence").is_some()));
+    let id = path.split('.').next().unwrap_or_default();
+    if effects(value) && EffectId::from_id(id).is_some() && step(value, id).is_none() {
+        Found::Null
+    } else {
+        Found::Nothing
+    }
+}
+
+fn step<'v>(value: &'v Value, key: &str) -> Option<&'v Value> {
+    match value {
+        Value::Object(map) => map.get(key),
+        Value::Array(list) => match key.parse::<usize>() {
+            Ok(at) => list.get(at),
+            Err(_) => list.iter().find(|e| NAMES.iter().any(|n| e.get(n).and_then(Value::as_str) == Some(key))),
+        },
+        _ => None,
+    }
+}

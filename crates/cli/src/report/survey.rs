@@ -1,0 +1,201 @@
+//! The report of what was told without a reference: what two channels draw, and how far an angle at rest wanders.
+
+use std::fmt::Write as _;
+
+use cvg_calibration::Surveyed;
+use cvg_calibration::report::survey::Survey;
+use cvg_calibration::report::{Allan, Estimate};
+use serde_json::json;
+
+use super::figures::{Figure, axis, shorts};
+use super::finding::{degrees, interval, times};
+use super::tables::{row, table};
+use super::{begin, draw, escape, finish, warnings};
+use crate::Failure;
+use crate::commands::significant;
+
+/// The page.
+pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
+    let r = &surveyed.report;
+    let figures: Vec<Figure> =
+        [circle(surveyed), radius(surveyed), r.allan.as_ref().map(deviation)].into_iter().flatten().collect();
+    let mut h = String::with_capacity(6 << 20);
+    begin(&mut h, &r.device, r.instrument);
+    headline(&mut h, r);
+    warnings(&mut h, &r.warnings);
+    h.push_str("</header><main>");
+    parameters(&mut h, r);
+    effects(&mut h, r);
+    draw(&mut h, "<p>The figures need scripts, which this file brings along.</p>", &figures);
+    files(&mut h, r);
+    let json = serde_json::to_string_pretty(r).map_err(Failure::input)?;
+    finish(&mut h, &json, r.schema, "There is no angle error: nothing was recorded to count it against.", &figures)?;
+    Ok(h)
+}
+
+fn headline(h: &mut String, r: &Survey) {
+    if let Some(radius) = &r.radius {
+        let [before, after] = [radius.before.rms, radius.after.rms].map(|v| format!("{:.3} %", 100.0 * v));
+        let angle = radius
+            .correction_rms_deg
+            .map_or(String::new(), |d| format!(" Undoing it changes the angle by {} rms.", degrees(d)));
+        let _ = write!(
+            h,
+            "<p class=\"headline\">{before} <span class=\"arrow\">→</span> {after} rms of the radius, {}</p><p \
+             class=\"finding\">A sensor without a reference: the radius of its two channels, on rows that nothing was fitted \
+             to, as recorded and with what was found undone.{angle}</p>",
+            times(radius.before.rms, radius.after.rms)
+        );
+    }
+    if let Some(allan) = &r.allan {
+        let _ = write!(h, "<p class=\"finding\">At rest:{}.</p>", escape(&allan_in_words(allan).join(";")));
+    }
+}
+
+fn parameters(h: &mut String, r: &Survey) {
+    h.push_str("<h2 id=\"parameters\">Parameters</h2>");
+    table(h, "Values with 95 % intervals", &["parameter", "value", "95 % interval", "unit"], |h| {
+        let mut estimate = |name: &str, e: Option<&Estimate>, unit: &str| {
+            if let Some(e) = e {
+                let [value, low, high] = interval(e.value, e.ci95);
+                row(h, &[name, &value, &format!("{low} … {high}"), unit]);
+            }
+        };
+        estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref(), "1");
+        if let Some(a) = &r.allan {
+            estimate("angle random walk", a.angle_random_walk_deg_sqrt_h.as_ref(), "deg/√h");
+            estimate("bias instability", Some(&a.bias_instability_dph), "deg/h");
+        }
+        for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
+            let name = format!("{}: {}", escape(&e.id), escape(&p.name));
+            let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
+                Some([value, low, high]) => (value, format!("{low} … {high}")),
+                None => (significant(p.value), "as it was read".to_owned()),
+            };
+            row(h, &[&name, &value, &ends, &escape(&p.unit)]);
+        }
+    });
+}
+
+fn effects(h: &mut String, r: &Survey) {
+    if r.effects.is_empty() {
+        return;
+    }
+    h.push_str("<h2 id=\"effects\">Effects</h2>");
+    table(h, "What the data supports", &["effect", "evidence"], |h| {
+        for e in &r.effects {
+            let _ = write!(h, "<tr><td>{}</td><td class=\"why\">{}</td></tr>", escape(&e.id), escape(&e.evidence));
+        }
+    });
+}
+
+fn files(h: &mut String, r: &Survey) {
+    h.push_str("<h2 id=\"files\">Files</h2>");
+    table(h, "Recordings", &["file", "kind", "used for", "rows", "rate at rest [deg/s]"], |h| {
+        for x in &r.runs {
+            let rate = x.bias_dps.map_or("—".into(), |b| format!("{:.3e} ± {:.1e}", b.value, b.half_width()));
+            row(h, &[&escape(&x.file), &x.kind, &x.r#use, &x.rows.to_string(), &rate]);
+        }
+    });
+}
+
+/// x over y, as recorded and after, with the circle that they should draw.
+fn circle(surveyed: &Surveyed) -> Option<Figure> {
+    let curve = surveyed.curve.as_ref()?;
+    let points = |name: &str, symbol: &str, points: &[[f64; 2]]| {
+        json!({"type": "scatter", "mode": "markers", "name": name, "meta": name,
+               "x": shorts(points.iter().map(|p| p[0])), "y": shorts(points.iter().map(|p| p[1])),
+               "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8}})
+    };
+    let turn = || (0..=180).map(|i| f64::from(i) * std::f64::consts::PI / 90.0);
+    let circle = json!({"type": "scatter", "mode": "lines", "name": "circle", "x": shorts(turn().map(f64::cos)),
+                        "y": shorts(turn().map(f64::sin)), "line": {"color": "@4", "width": 1.2}});
+    let traces = vec![points("raw", "circle", &curve.before), points("discovered", "diamond", &curve.after), circle];
+    let mut layout =
+        json!({"xaxis": axis("x over the mean radius"), "yaxis": axis("y over the mean radius"), "showlegend": true});
+    layout["yaxis"]["scaleanchor"] = json!("x");
+    let caption = "The two channels against each other on held-out rows: as recorded, with what was found undone, and the \
+                   circle that a sensor without errors draws.";
+    Some(Figure::new("circle", "X and Y", caption, traces, layout))
+}
+
+fn radius(surveyed: &Surveyed) -> Option<Figure> {
+    let curve = surveyed.curve.as_ref()?;
+    let points = |name: &str, symbol: &str, points: &[[f64; 2]]| {
+        json!({"type": "scatter", "mode": "markers", "name": name, "meta": name,
+               "x": shorts(points.iter().map(|[x, y]| y.atan2(*x).to_degrees())),
+               "y": shorts(points.iter().map(|[x, y]| 100.0 * (x.hypot(*y) - 1.0))),
+               "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8}})
+    };
+    let traces = vec![points("raw", "circle", &curve.before), points("discovered", "diamond", &curve.after)];
+    let mut layout =
+        json!({"xaxis": axis("angle [deg]"), "yaxis": axis("radius less its mean [%]"), "showlegend": true});
+    layout["xaxis"]["dtick"] = json!(45);
+    let caption = "The radius over the angle: once a turn is an offset, twice a gain or a skew, four times a cubic.";
+    Some(Figure::new("radius", "Radius", caption, traces, layout))
+}
+
+fn deviation(allan: &Allan) -> Figure {
+    let half = |i: usize| -> Vec<f64> {
+        allan
+            .points
+            .iter()
+            .map(|p| if i == 0 { p.deviation_dph - p.ci95[0] } else { p.ci95[1] - p.deviation_dph })
+            .collect()
+    };
+    let traces = vec![json!({"type": "scatter", "mode": "lines+markers", "name": "Allan deviation",
+        "x": shorts(allan.points.iter().map(|p| p.tau_s)), "y": shorts(allan.points.iter().map(|p| p.deviation_dph)),
+        "error_y": {"type": "data", "symmetric": false, "array": shorts(half(1)), "arrayminus": shorts(half(0))},
+        "marker": {"size": 5, "color": "@declared"}, "line": {"color": "@declared", "width": 1.4}})];
+    let mut layout =
+        json!({"xaxis": axis("averaging time [s]"), "yaxis": axis("deviation [deg/h]"), "showlegend": false});
+    layout["xaxis"]["type"] = json!("log");
+    layout["yaxis"]["type"] = json!("log");
+    let caption = "Overlapping Allan deviation at rest, with 95 % intervals: −1 is noise of the angle, −½ angle random walk, \
+                   flat bias instability, +½ a random walk of the rate.";
+    Figure::new("allan", "Allan deviation", caption, traces, layout)
+}
+
+/// The Allan deviation in a line or two of a summary.
+pub(crate) fn allan_in_words(allan: &Allan) -> Vec<String> {
+    let told = |e: &Estimate, unit: &str| format!("{} ± {:.1e} {unit}", significant(e.value), e.half_width());
+    let walk = allan.angle_random_walk_deg_sqrt_h.as_ref().map_or("none seen".to_owned(), |e| told(e, "deg/√h"));
+    vec![
+        format!("  angle random walk           {walk}"),
+        format!(
+            "  bias instability            {} at {} s",
+            told(&allan.bias_instability_dph, "deg/h"),
+            significant(allan.bias_instability_tau_s)
+        ),
+    ]
+}
+
+/// What a person wants to read first.
+pub(crate) fn summary(r: &Survey) -> String {
+    let mut s = format!("{} ({})\n", r.device, r.instrument);
+    let mut line = |text: String| {
+        let _ = writeln!(s, "{text}");
+    };
+    if let Some(radius) = &r.radius {
+        line(format!(
+            "  held-out radius, rms        {:.4} % as recorded → {:.4} %",
+            100.0 * radius.before.rms,
+            100.0 * radius.after.rms
+        ));
+        if let Some(d) = radius.correction_rms_deg {
+            line(format!("  which changes the angle by  {d:.5}° rms"));
+        }
+    }
+    for e in &r.effects {
+        let parameters = e.parameters.iter().map(|p| {
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            format!("{} = {} {unit}", p.name, significant(p.value)).trim_end().to_owned()
+        });
+        line(format!("  {:<26} {}", e.id, parameters.collect::<Vec<_>>().join(", ")));
+    }
+    r.allan.iter().flat_map(allan_in_words).for_each(&mut line);
+    for w in &r.warnings {
+        line(format!("  warning: {w}"));
+    }
+    s
+}

@@ -1,0 +1,205 @@
+//! Sin/cos sensors as their users bring them: one file, no campaign, often nothing that says what they were turned by.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::ffi::OsStr;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use support::{Bench, Sheet, cvg, cvg_ok};
+use tempfile::TempDir;
+
+/// Even noise of variance 1, from a counter.
+fn noise(i: usize, seed: u64) -> f64 {
+    let mut x = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    let even = (x ^ (x >> 31)) as f64 / u64::MAX as f64;
+    (even - 0.5) * 12f64.sqrt()
+}
+
+const OFFSET: [f64; 2] = [0.12, -0.07];
+const GAIN_RATIO: f64 = 1.04;
+const SKEW: f64 = 0.015;
+const CUBIC: f64 = 0.02;
+
+/// A sensor in counts, turned at a speed that nobody wrote down: x = a (c + o_x), y = a (g (s + k c) + o_y), with a cubic.
+fn turned_by_hand(unit: f64, cubic: f64, rail: f64, reference: bool) -> String {
+    let mut text = String::from(if reference { "t_s,table_deg,xc_v,yc_v\n" } else { "t_s,xc_v,yc_v\n" });
+    for i in 0..4000 {
+        let t = i as f64 * 0.01;
+        let table = 40.0 * t + 25.0 * (0.7 * t).sin();
+        let (sin, cos) = table.to_radians().sin_cos();
+        let c = |u: f64| u * (1.0 + 0.75 * cubic * u * u);
+        let x = unit * (c(cos) + OFFSET[0] + 2e-4 * noise(i, 1));
+        let y = unit * (GAIN_RATIO * c(sin + SKEW * cos) + OFFSET[1] + 2e-4 * noise(i, 2));
+        let [x, y] = [x, y].map(|v| v.clamp(-rail, rail));
+        let _ = if reference { writeln!(text, "{t},{table},{x},{y}") } else { writeln!(text, "{t},{x},{y}") };
+    }
+    text
+}
+
+fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    path
+}
+
+fn sensor(file: &Path) -> Value {
+    serde_json::from_str(&cvg_ok(&[OsStr::new("identify"), file.as_os_str(), "--sensor".as_ref(), "--json".as_ref()]))
+        .unwrap()
+}
+
+/// Value and interval of a parameter.
+fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 3] {
+    let effects = report["effects"].as_array().unwrap();
+    let effect = effects.iter().find(|e| e["id"] == effect).unwrap_or_else(|| panic!("no {effect}: {effects:#?}"));
+    let p = effect["parameters"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap().clone();
+    [&p["value"], &p["ci95"][0], &p["ci95"][1]].map(|v| v.as_f64().unwrap())
+}
+
+/// Within the interval, widened by half: the check is one draw.
+fn holds([value, low, high]: [f64; 3], truth: f64) -> bool {
+    (value - truth).abs() <= 0.75 * (high - low)
+}
+
+#[test]
+fn two_channels_without_a_reference_tell_offsets_gain_skew_and_cubic() {
+    let folder = TempDir::new().unwrap();
+    let unit = 900.0;
+    let r = sensor(&written(&folder, "hall.csv", &turned_by_hand(unit, CUBIC, f64::INFINITY, false)));
+    assert_eq!(r["status"], "answered");
+    let ratio = &r["detection_gain_ratio"];
+    let ratio = [&ratio["value"], &ratio["ci95"][0], &ratio["ci95"][1]].map(|v| v.as_f64().unwrap());
+    assert!(holds(ratio, GAIN_RATIO) && (ratio[0] - GAIN_RATIO).abs() < 2e-3, "{ratio:?}");
+    for (name, truth) in [("offset_x", OFFSET[0]), ("offset_y", OFFSET[1])] {
+        let p = parameter(&r, "detection-offset", name);
+        assert!((p[0] / unit - truth).abs() < 5e-4, "{name} {p:?}");
+    }
+    let skew = parameter(&r, "detection-skew", "skew");
+    assert!((skew[0] - SKEW).abs() < 1e-3, "{skew:?}");
+    let kappa = parameter(&r, "detection-cubic", "kappa");
+    assert!((kappa[0] * unit * unit / CUBIC - 1.0).abs() < 0.15, "{kappa:?}");
+    let (before, after) = (&r["radius"]["before"]["rms"], &r["radius"]["after"]["rms"]);
+    assert!(after.as_f64().unwrap() < 3e-4 && before.as_f64().unwrap() > 0.05, "{before} {after}");
+}
+
+#[test]
+fn what_cannot_be_seen_without_a_reference_is_null_and_said() {
+    let folder = TempDir::new().unwrap();
+    let file = written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, false));
+    let out = folder.path().join("out");
+    let arguments: [&OsStr; 5] =
+        ["identify".as_ref(), file.as_ref(), "--sensor".as_ref(), "--out".as_ref(), out.as_ref()];
+    let said = cvg_ok(&arguments);
+    assert!(said.contains("held-out radius") && said.contains("there is no reference"), "{said}");
+    let r: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
+    for path in
+        ["/angular_gain", "/heldout/raw", "/heldout/declared", "/heldout/discovered", "/heldout/noise_floor_deg"]
+    {
+        assert!(r.pointer(path).unwrap().is_null(), "{path}");
+    }
+    let unseen = r["warnings"].to_string();
+    for part in ["eccentric", "angular gain", "look alike"] {
+        assert!(unseen.contains(part), "{part}: {unseen}");
+    }
+    assert!(r["effects"].as_array().unwrap().iter().all(|e| e["id"] != "detection-cubic"), "no cubic was put in");
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("X and Y") && page.contains("of the radius"));
+    assert!(fs::read_to_string(out.join("calibration.toml")).unwrap().contains("detection-offset"));
+}
+
+#[test]
+fn a_channel_at_its_rail_is_seen_without_a_reference() {
+    let folder = TempDir::new().unwrap();
+    let r = sensor(&written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, 1.0, false)));
+    let rail = r["effects"].as_array().unwrap().iter().find(|e| e["id"] == "detection-clip").cloned();
+    assert!(rail.is_some_and(|e| e["parameters"].to_string().contains("1.0")), "{:#}", r["effects"]);
+    assert!((r["detection_gain_ratio"]["value"].as_f64().unwrap() - GAIN_RATIO).abs() < 5e-3);
+}
+
+#[test]
+fn less_than_half_a_turn_without_a_reference_is_no_answer() {
+    let folder = TempDir::new().unwrap();
+    let whole = turned_by_hand(1.0, 0.0, f64::INFINITY, false);
+    let file = written(&folder, "arc.csv", &whole.lines().take(200).map(|l| format!("{l}\n")).collect::<String>());
+    let outcome = cvg(&[OsStr::new("identify"), file.as_ref(), "--sensor".as_ref()]);
+    assert_eq!(outcome.status, 1, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("rows all around the turn"), "{}", outcome.stderr);
+}
+
+#[test]
+fn an_angle_alone_says_nothing_of_itself() {
+    let folder = TempDir::new().unwrap();
+    let text: String = (0..500).map(|i| format!("{},{}\n", i, 3 * i % 360)).collect();
+    let file = written(&folder, "angle.csv", &format!("t_s,theta_deg\n{text}"));
+    let campaign = written(
+        &folder,
+        "campaign.toml",
+        "[campaign]\ndevice = \"e\"\ninstrument = \"sensor\"\nreference = \"none\"\n[[run]]\nkind = \"rotation\"\nfile = \"angle.csv\"\n",
+    );
+    for path in [file, campaign] {
+        let outcome = cvg(&[OsStr::new("identify"), path.as_ref(), "--sensor".as_ref()]);
+        assert_eq!(outcome.status, 2, "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("xc_v"), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn a_reference_that_is_not_to_be_used_is_not_used() {
+    let folder = TempDir::new().unwrap();
+    written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, true));
+    let head = "[campaign]\ndevice = \"hall\"\ninstrument = \"sensor\"\n";
+    let run = "[[run]]\nkind = \"rotation\"\nfile = \"hall.csv\"\n";
+    let told = |more: &str| {
+        let campaign = written(&folder, "campaign.toml", &format!("{head}{more}{run}"));
+        support::report(&campaign)
+    };
+    assert!(told("reference = \"none\"\n")["angular_gain"].is_null());
+    assert!(told("")["angular_gain"]["value"].is_number());
+}
+
+#[test]
+fn a_sensor_given_as_a_gyroscope_is_told_what_it_looks_like() {
+    let folder = TempDir::new().unwrap();
+    let with = written(&folder, "resolver.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, true));
+    let given = cvg(&[OsStr::new("identify"), with.as_ref()]);
+    assert!(format!("{}{}", given.stdout, given.stderr).contains("--sensor"), "{}{}", given.stdout, given.stderr);
+    let r = sensor(&with);
+    assert_eq!((r["instrument"].as_str(), r["angular_gain"]["value"].as_f64()), (Some("sensor"), Some(-1.0)));
+    let without = written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, false));
+    let given = cvg(&[OsStr::new("identify"), without.as_ref()]);
+    assert_eq!(given.status, 2);
+    assert!(given.stderr.contains("--sensor"), "{}", given.stderr);
+}
+
+#[test]
+fn a_gyroscope_given_as_a_sensor_is_told_what_it_looks_like() {
+    let bench = Bench::small();
+    let file = bench.path("rot+500.csv");
+    let given = cvg(&[OsStr::new("identify"), file.as_ref(), "--sensor".as_ref()]);
+    assert!(format!("{}{}", given.stdout, given.stderr).contains("look like a gyroscope"), "{given:?}");
+}
+
+#[test]
+fn a_constant_rate_of_the_campaign_stands_in_for_the_column() {
+    let bench = Bench::small();
+    let wanted = support::report(&bench.campaign());
+    for (name, rate) in [("rot+500.csv", 500), ("rot-300.csv", -300), ("check.csv", 400)] {
+        let sheet = Sheet::of(&bench.read(name));
+        let kept: Vec<&str> = sheet.header.iter().map(String::as_str).filter(|c| *c != "rate_dps").collect();
+        bench.write(name, sheet.only(&kept).text());
+        bench.replace(
+            "campaign.toml",
+            &format!("file = \"{name}\"\n"),
+            &format!("file = \"{name}\"\nrate_dps = {rate}\n"),
+        );
+    }
+    let found = support::report(&bench.campaign());
+    for key in ["angular_gain", "detection_gain_ratio", "heldout"] {
+        assert_eq!(found[key], wanted[key], "{key}");
+    }
+}
