@@ -22,6 +22,7 @@ use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
+use crate::report::scale_factor::{gains, scale_factor};
 use crate::report::stages::stages;
 use crate::report::unexplained::{described, unexplained};
 use crate::report::{
@@ -127,6 +128,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         if options.discover { discover(&mut bench, declared, options.progress)? } else { (declared, Vec::new()) };
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut bench, &mut fitted, &mut steps)?;
+    let scale_factor = scale_factor(&gains(&mut bench, &fitted));
     (options.progress)("measuring the held-out error");
     let heldout = |h: &Hypothesis, fit: &Fit, like: Option<&Evaluation>| {
         evaluate(&bench.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
@@ -237,7 +239,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         runs,
         decomposition: Vec::new(),
         proposals: Vec::new(),
-        scale_factor: None,
+        scale_factor,
         allan: None,
         warnings,
     };

@@ -238,6 +238,43 @@ fn a_run_at_rest_that_is_too_short_is_no_answer() {
     assert!(outcome.stderr.contains("rest.csv") && outcome.stderr.contains("too few"), "{}", outcome.stderr);
 }
 
+// Scale factor
+
+#[test]
+fn a_planted_nonlinearity_of_200_ppm_is_found_within_a_tenth() {
+    let mut scenario = String::from(
+        "device = \"six\"\nangular_gain = 0.78\nnoise_v = 2e-5\ntau_s = 10.0\nseed = 3\n\
+         effects = [{ id = \"detection-gain-mismatch\", detection_gain_ratio = 1.0132 }]\n",
+    );
+    let rates = [500.0, -500.0, 300.0, -300.0, 100.0, -100.0];
+    for rate in rates {
+        let _ = write!(
+            scenario,
+            "\n[[run]]\nkind = \"rotation\"\nfile = \"rot{rate:+}.csv\"\nrate_dps = {rate:.1}\nduration_s = 12.0\nsettle_s = 0.5\n"
+        );
+    }
+    let settings = cvg_simulator::Scenario::parse(&scenario).unwrap().settings().clone();
+    let bench = Bench::simulated(settings);
+    let clean = report(&bench.campaign());
+    let [value, low, high] = estimate(&clean["scale_factor"]["nonlinearity_ppm"]);
+    assert!(low < 0.0 && high > 0.0 && value.abs() < 5.0, "nothing planted: {value} {low} {high}");
+    for rate in rates {
+        // the table turns by less than it says: the instrument's gain seems larger by as much
+        let ppm = 200.0 * (f64::abs(rate) - 100.0) / 400.0;
+        bench.change(&format!("rot{rate:+}.csv"), |text| {
+            let mut sheet = Sheet::of(&text);
+            sheet.set("rate_dps", |_, v| v * (1.0 - 1e-6 * ppm));
+            sheet.text()
+        });
+    }
+    let planted = report(&bench.campaign());
+    let [value, low, high] = estimate(&planted["scale_factor"]["nonlinearity_ppm"]);
+    println!("planted 200 ppm, found {value} ({low} to {high}); clean {}", clean["scale_factor"]);
+    assert!((value / 200.0 - 1.0).abs() < 0.1, "{value} ({low} to {high})");
+    let [value, low, high] = estimate(&planted["scale_factor"]["asymmetry_ppm"]);
+    assert!(low < 0.0 && high > 0.0 && value.abs() < 5.0, "no asymmetry was planted: {value} ({low} to {high})");
+}
+
 // Compensation
 
 #[test]

@@ -288,7 +288,7 @@ impl Bench {
 
     /// The force scale from the energy balance alone: how the amplitude answers to the energy command. The amplitude's
     /// own noise wanders, so this is a belief for the fit of the angle and not a part of it.
-    fn balance_energy(&mut self, hypothesis: &mut Hypothesis) {
+    pub(crate) fn balance_energy(&mut self, hypothesis: &mut Hypothesis) {
         self.energy_balance = None;
         let starts: Vec<_> = self.tracks.iter().map(|p| p.starts.clone()).collect();
         let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };

@@ -1,0 +1,184 @@
+//! How the scale factor goes with the input rate: the slope of each run's angle over its input, over its rate.
+//!
+//! $$k_i = k + c \frac{|Ω_i|}{Ω_{max}} + a\\,\mathrm{sgn}\\,Ω_i + \frac{b}{Ω_i}$$
+//!
+//! A bias b that all runs share looks like a gain at a steady rate; nothing is known of it but that it is of the order of
+//! the Earth's rate.
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::estimation::fit::{Effort, fit};
+use crate::estimation::joint_fit::{Bench, Fitted};
+use crate::estimation::linear::NormalEquations;
+use crate::estimation::residuals::{Residual, Window, residuals};
+use crate::estimation::statistics::robust_deviation;
+use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::recording::Role;
+use crate::report::{Estimate, ScaleFactor};
+
+/// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
+const BIAS_DPS: f64 = 0.004_2;
+/// What the other unknowns are believed to be, as shares of the gain: nothing.
+const VAGUE: f64 = 10.0;
+/// Rates that differ by less than this share of the largest are one rate.
+const SAME_RATE: f64 = 0.02;
+/// Rates that have to be there.
+const FEWEST_RATES: usize = 3;
+
+/// Blocks of the jackknife, and Student's 97.5 % point for one fewer degrees of freedom.
+const BLOCKS: usize = 10;
+const STUDENT_9: f64 = 2.262;
+/// What the drive leaves in the gain of a run, as a share of it, standard deviation: simulated devices without any
+/// nonlinearity show 0.6 and 1.6 ppm of it.
+const DRIVE: f64 = 2e-6;
+/// Samples further out than this many robust deviations are spikes.
+const SPIKE: f64 = 6.0;
+/// Unknowns of a run: the gain's deviation, second and fourth harmonic of the angle, which a run leaves off in the middle.
+const UNKNOWNS: usize = 5;
+
+/// Rate, deg/s, and angular gain of each run. Every run drifts by itself in a fit of its own: a gain that goes with the rate
+/// would else be taken for what the drive does.
+pub(crate) fn gains(bench: &mut Bench, fitted: &Fitted) -> Vec<(f64, Estimate)> {
+    let priors = bench.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
+    let balance = bench.energy_balance;
+    let drifted: Vec<bool> = bench.tracks.iter().map(|t| t.drifts).collect();
+    bench.tracks.iter_mut().for_each(|t| t.drifts = true);
+    // what the drive does is taken as it is believed to be: a gain that goes with the rate bends what is fitted of it
+    let mut hypothesis = Hypothesis { control_latency_s: 0.0, ..fitted.fit.hypothesis.clone() };
+    match &fitted.drive {
+        Some(drive) => hypothesis.force_scale = drive.mean(),
+        None => bench.balance_energy(&mut hypothesis),
+    }
+    let of_the_drive = |u: &Unknown| matches!(u, Unknown::ForceScale | Unknown::ControlLatency);
+    let unknowns: Vec<Unknown> = fitted.fit.unknowns.iter().copied().filter(|u| !of_the_drive(u)).collect();
+    let mut free = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, Effort::FULL);
+    free.starts.iter_mut().flatten().for_each(|start| start.drift = 0.0);
+    let segments = residuals(&bench.tracks, &free.hypothesis, &free.starts, Role::Fit, Window::Whole);
+    bench.tracks.iter_mut().zip(drifted).for_each(|(t, drifts)| t.drifts = drifts);
+    bench.energy_balance = balance;
+    let (k, sense) = (free.hypothesis.angular_gain, free.hypothesis.sense());
+    let told = bench.tracks.iter().zip(segments).filter_map(|(track, segments)| {
+        let (slope, deviation) = slope(&segments)?;
+        let (value, half) = (k + sense * slope, (STUDENT_9 * deviation).hypot(1.96 * DRIVE * k));
+        Some((track.track.mean_rate().to_degrees(), Estimate { value, ci95: [value - half, value + half] }))
+    });
+    told.collect()
+}
+
+/// Slope of the angle over the input, a constant for each segment, and its standard deviation by the jackknife over
+/// contiguous blocks.
+fn slope(segments: &[Residual]) -> Option<(f64, f64)> {
+    let mut rows: Vec<([f64; UNKNOWNS], f64)> = Vec::new();
+    for s in segments {
+        let row = |i: usize| {
+            let (s2, c2) = (2.0 * s.direction[i]).sin_cos();
+            let (s4, c4) = (4.0 * s.direction[i]).sin_cos();
+            ([s.turned[i], c2, s2, c4, s4], s.angle[i])
+        };
+        let all: Vec<_> = (0..s.angle.len()).map(row).collect();
+        let n = all.len().max(1) as f64;
+        let mean: [f64; UNKNOWNS] = std::array::from_fn(|c| all.iter().map(|r| r.0[c]).sum::<f64>() / n);
+        let middle = all.iter().map(|r| r.1).sum::<f64>() / n;
+        rows.extend(all.iter().map(|(r, v)| (std::array::from_fn(|c| r[c] - mean[c]), v - middle)));
+    }
+    if rows.len() < BLOCKS * UNKNOWNS {
+        return None;
+    }
+    let solve = |rows: &mut dyn Iterator<Item = &([f64; UNKNOWNS], f64)>| {
+        let mut equations = NormalEquations::new(UNKNOWNS);
+        rows.for_each(|(row, value)| equations.add(row, *value));
+        equations.solve()
+    };
+    let first = solve(&mut rows.iter());
+    let left = |(row, value): &([f64; UNKNOWNS], f64)| value - row.iter().zip(&first).map(|(a, b)| a * b).sum::<f64>();
+    let limit = SPIKE * robust_deviation(rows.iter().map(left));
+    rows.retain(|r| left(r).abs() <= limit);
+    let n = rows.len();
+    let value = solve(&mut rows.iter())[0];
+    let without: Vec<f64> = (0..BLOCKS)
+        .map(|b| solve(&mut rows.iter().enumerate().filter(|(i, _)| i * BLOCKS / n != b).map(|(_, r)| r))[0])
+        .collect();
+    let mean = without.iter().sum::<f64>() / BLOCKS as f64;
+    let spread: f64 = without.iter().map(|w| (w - mean).powi(2)).sum();
+    let deviation = ((BLOCKS - 1) as f64 / BLOCKS as f64 * spread).sqrt();
+    (value.is_finite() && deviation.is_finite()).then_some((value, deviation))
+}
+
+/// Nonlinearity and asymmetry from rates and gains, where three rates or more and both senses are there.
+pub(crate) fn scale_factor(gains: &[(f64, Estimate)]) -> Option<ScaleFactor> {
+    let told: Vec<(f64, Estimate)> =
+        gains.iter().copied().filter(|(rate, gain)| rate.abs() > 0.0 && gain.half_width() > 0.0).collect();
+    let fastest = told.iter().map(|(rate, _)| rate.abs()).fold(0.0, f64::max);
+    let slowest = told.iter().map(|(rate, _)| rate.abs()).fold(f64::INFINITY, f64::min);
+    let both = told.iter().any(|t| t.0 > 0.0) && told.iter().any(|t| t.0 < 0.0);
+    let range = 1.0 - slowest / fastest;
+    if distinct(&told, fastest) < FEWEST_RATES || !both || range < SAME_RATE {
+        return None;
+    }
+    let mean = told.iter().map(|t| t.1.value).sum::<f64>() / told.len() as f64;
+    let prior = [VAGUE, VAGUE, VAGUE, BIAS_DPS].map(|s| (s * mean).powi(-2));
+    let mut information = Matrix4::from_diagonal(&Vector4::from(prior));
+    let mut right = Vector4::zeros();
+    let row = |rate: f64| Vector4::new(1.0, rate.abs() / fastest, rate.signum(), 1.0 / rate);
+    for (rate, gain) in &told {
+        let (row, weight) = (row(*rate), (1.96 / gain.half_width()).powi(2));
+        information += weight * row * row.transpose();
+        right += weight * (gain.value - mean) * row;
+    }
+    let covariance = information.try_inverse()?;
+    let x = covariance * right;
+    // runs that scatter by more than they say widen all intervals
+    let left: f64 = told
+        .iter()
+        .map(|(rate, gain)| ((gain.value - mean - row(*rate).dot(&x)) * 1.96 / gain.half_width()).powi(2))
+        .sum();
+    let spare = told.len().saturating_sub(4);
+    let wider = if spare > 0 { (left / spare as f64).max(1.0).sqrt() } else { 1.0 };
+    let ppm = 1e6 / (mean + x[0] + 0.5 * (1.0 + slowest / fastest) * x[1]);
+    let estimate = |i: usize, scale: f64| {
+        Estimate::new(ppm * scale * x[i], (ppm * scale * wider * covariance[(i, i)].max(0.0).sqrt()).abs())
+    };
+    Some(ScaleFactor { nonlinearity_ppm: estimate(1, range), asymmetry_ppm: estimate(2, 2.0) })
+}
+
+/// Rates with their signs that are not one.
+fn distinct(told: &[(f64, Estimate)], fastest: f64) -> usize {
+    let mut rates: Vec<f64> = told.iter().map(|t| t.0).collect();
+    rates.sort_by(f64::total_cmp);
+    rates.dedup_by(|a, b| (*a - *b).abs() < SAME_RATE * fastest);
+    rates.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(rate: f64, gain: f64, half_width: f64) -> (f64, Estimate) {
+        (rate, Estimate { value: gain, ci95: [gain - half_width, gain + half_width] })
+    }
+
+    #[test]
+    fn nonlinearity_asymmetry_and_bias_are_told_apart() {
+        let (k, bias) = (0.78, 0.003);
+        let runs: Vec<(f64, Estimate)> = [-500.0, -300.0, -100.0, 100.0, 300.0, 500.0]
+            .map(|rate: f64| {
+                let ppm = 200.0 * (rate.abs() - 100.0) / 400.0 + 25.0 * rate.signum();
+                run(rate, k * (1.0 + 1e-6 * ppm) + bias / rate, 1e-6)
+            })
+            .into();
+        let s = scale_factor(&runs).expect("six rates");
+        assert!((s.nonlinearity_ppm.value - 200.0).abs() < 4.0, "{s:?}");
+        assert!((s.asymmetry_ppm.value - 50.0).abs() < 4.0, "{s:?}");
+        assert!(s.nonlinearity_ppm.half_width() < 10.0, "{s:?}");
+    }
+
+    #[test]
+    fn three_rates_leave_a_bias_of_the_earths_rate_open() {
+        let runs: Vec<(f64, Estimate)> = [-300.0, 100.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
+        let s = scale_factor(&runs).expect("three rates");
+        assert!(s.nonlinearity_ppm.value.abs() < 1e-6 && s.nonlinearity_ppm.half_width() > 20.0, "{s:?}");
+        assert_eq!(scale_factor(&runs[1..]), None);
+        let one_way: Vec<(f64, Estimate)> = [100.0, 300.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
+        assert_eq!(scale_factor(&one_way), None);
+    }
+}
