@@ -54,11 +54,15 @@ pub(crate) fn foreign_columns(path: &Path, error: &ReadError) -> Option<Vec<(Str
     Some(columns)
 }
 
-/// The files that names and patterns stand for. A name that exists is itself, whatever signs are in it.
+/// The files that names and patterns stand for: a folder for the campaign in it. A name that exists is itself, whatever signs are in it.
 pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut out: Vec<PathBuf> = Vec::new();
     for name in names {
         let text = name.to_string_lossy();
+        if let Some(campaign) = Some(name.join("campaign.toml")).filter(|path| path.is_file()) {
+            out.push(campaign);
+            continue;
+        }
         if name.exists() || !text.contains(['*', '?', '[']) {
             out.push(name.clone());
             continue;

@@ -182,7 +182,9 @@ fn a_header_without_rows_is_refused() {
 #[test]
 fn a_directory_in_the_place_of_a_file_is_refused() {
     let bench = Bench::small();
-    assert_identify_refuses(&bench, bench.campaign().parent().unwrap(), &["is a directory", "campaign.toml"]);
+    // a folder is the campaign in it, where there is one
+    fs::create_dir(bench.path("empty")).unwrap();
+    assert_identify_refuses(&bench, &bench.path("empty"), &["is a directory", "campaign.toml"]);
     fs::remove_file(bench.path("rot+500.csv")).unwrap();
     fs::create_dir(bench.path("rot+500.csv")).unwrap();
     assert_campaign_refused(&bench, &["campaign.toml", "line", "rot+500.csv", "is a directory"]);

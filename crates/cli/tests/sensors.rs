@@ -185,6 +185,13 @@ fn a_gyroscope_given_as_a_sensor_is_told_what_it_looks_like() {
 }
 
 #[test]
+fn a_folder_is_the_campaign_in_it() {
+    let bench = Bench::small();
+    let folder = bench.campaign().parent().unwrap().to_owned();
+    assert_eq!(support::report(&folder), support::report(&bench.campaign()));
+}
+
+#[test]
 fn a_constant_rate_of_the_campaign_stands_in_for_the_column() {
     let bench = Bench::small();
     let wanted = support::report(&bench.campaign());
