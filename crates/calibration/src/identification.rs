@@ -4,6 +4,7 @@ use cvg_model::effects::{EffectId, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
 use crate::angle_sensor;
+use crate::carrier;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::picture::{Picture, Scene};
 use crate::diagnostics::residual::{
@@ -15,6 +16,7 @@ use crate::estimation::fit::Fit;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
+use crate::free_decay;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Campaign, Instrument, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
@@ -110,6 +112,20 @@ pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Resul
 }
 
 fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+    let campaign = carrier::demodulated(campaign)?;
+    if free_decay::serves(&campaign) {
+        return free_decay::identify(campaign, options, pictured);
+    }
+    let (campaign, decays) = free_decay::apart(campaign);
+    let mut identified = looped(campaign, options, pictured)?;
+    if let Some(decays) = decays {
+        free_decay::beside(&mut identified, decays, options);
+    }
+    Ok(identified)
+}
+
+/// An instrument whose loops are closed, or that has none.
+fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
         return angle_sensor::identify(campaign, options, pictured);
@@ -193,7 +209,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
             _ => "holdout".into(),
         };
     }
-    for (run, r) in runs.iter_mut().filter(|r| r.kind != "rotation").zip(&fitted.ring_downs) {
+    for (run, r) in runs.iter_mut().filter(|r| r.kind == "ringdown").zip(&fitted.ring_downs) {
         run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
     }
     let mut unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
@@ -241,6 +257,7 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
         proposals: Vec::new(),
         scale_factor,
         allan: None,
+        decay: None,
         warnings,
     };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: report.inputs.clone(), amplitude_v };
@@ -297,7 +314,7 @@ pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {
         file: run.file.display().to_string(),
         kind: run.kind.name().into(),
         r#use: if run.kind == RunKind::Static { "at rest".into() } else { "fit".into() },
-        rows: run.recording.len(),
+        rows: run.recording.reference_hz.map_or(run.recording.len(), |_| rows_read(d)),
         dropped: dropped(d),
         rate_dps: None,
         spikes: 0,
@@ -307,6 +324,11 @@ pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {
         rms_deg: None,
         agrees: None,
     }
+}
+
+/// Rows that a recording had before it was demodulated.
+fn rows_read(d: &crate::recording::Dropped) -> usize {
+    usize::try_from(d.rows_kept).unwrap_or(usize::MAX)
 }
 
 /// Why rows of a file are not in its recording.

@@ -34,10 +34,12 @@
 #![forbid(unsafe_code)]
 
 mod angle_sensor;
+mod carrier;
 mod data;
 mod diagnostics;
 mod error;
 mod estimation;
+mod free_decay;
 mod identification;
 mod model;
 pub mod report;

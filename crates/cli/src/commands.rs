@@ -195,6 +195,7 @@ pub(crate) fn summary(identified: &Identification) -> String {
     ));
     let estimate = |e: &Option<cvg_calibration::report::Estimate>| {
         e.as_ref()
+            .filter(|e| e.is_told())
             .map_or("not told by this campaign".to_owned(), |e| format!("{:.6} ± {:.1e}", e.value, e.half_width()))
     };
     line(format!("  angular gain k              {}", estimate(&Some(r.angular_gain))));

@@ -163,6 +163,7 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
         RunKind::Rotation => ", a rotation",
         RunKind::Ringdown { .. } => ", a ring-down",
         RunKind::Static => ", at rest",
+        RunKind::Decay => ", a free decay",
     });
     line(format!("{}{kind}", recording.source.display()));
     line(format!(

@@ -22,7 +22,7 @@ pub(crate) fn entries(r: &Report) -> Vec<Entry> {
         entry(
             "scale factor",
             "angular gain k: pattern angle per input angle",
-            format!("{:.7} ± {:.1e}", k.value, k.half_width()),
+            if k.is_told() { format!("{:.7} ± {:.1e}", k.value, k.half_width()) } else { "not told".into() },
         ),
         entry(
             "scale factor",
@@ -82,5 +82,6 @@ fn anisodamping_drift(r: &Report) -> Option<String> {
 }
 
 fn threshold(r: &Report) -> Option<String> {
-    anisodamping(r).map(|a| format!("{:.5} deg/s", (a / (2.0 * r.angular_gain.value)).to_degrees()))
+    let told = anisodamping(r).filter(|_| r.angular_gain.is_told());
+    told.map(|a| format!("{:.5} deg/s", (a / (2.0 * r.angular_gain.value)).to_degrees()))
 }

@@ -29,11 +29,19 @@ pub enum Channel {
     Vqc,
     /// `temp_c`: temperature, °C.
     Temperature,
+    /// `x_v`: displacement of X itself, carrier and all, in any unit.
+    X,
+    /// `y_v`: displacement of Y itself, carrier and all, in the unit of X.
+    Y,
+    /// `fx_v`: force on X itself, V.
+    Fx,
+    /// `fy_v`: force on Y itself, V.
+    Fy,
 }
 
 impl Channel {
     /// All channels, in the order in which a recording is written that was not read from a file.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 15] = [
         Self::Time,
         Self::Rate,
         Self::Table,
@@ -45,6 +53,10 @@ impl Channel {
         Self::Vas,
         Self::Vqc,
         Self::Temperature,
+        Self::X,
+        Self::Y,
+        Self::Fx,
+        Self::Fy,
     ];
 
     /// The column name, unit included.
@@ -62,6 +74,10 @@ impl Channel {
             Self::Vas => "vas_v",
             Self::Vqc => "vqc_v",
             Self::Temperature => "temp_c",
+            Self::X => "x_v",
+            Self::Y => "y_v",
+            Self::Fx => "fx_v",
+            Self::Fy => "fy_v",
         }
     }
 
@@ -75,11 +91,11 @@ impl Channel {
     /// Whether a row without this value is of no use.
     ///
     /// True for the time, the reference (`rate_dps`, `table_deg`) and the angle (`xc_v`, `xs_v`, `yc_v`, `ys_v`,
-    /// `theta_deg`): a row with a missing cell in one of these is dropped. False for controller outputs and temperature:
-    /// there a missing cell is NaN.
+    /// `theta_deg`, `x_v`, `y_v`): a row with a missing cell in one of these is dropped. False for controller outputs,
+    /// forces and temperature: there a missing cell is NaN.
     #[must_use]
     pub const fn is_needed_in_every_row(self) -> bool {
-        !matches!(self, Self::Vas | Self::Vqc | Self::Temperature)
+        !matches!(self, Self::Vas | Self::Vqc | Self::Temperature | Self::Fx | Self::Fy)
     }
 }
 

@@ -36,8 +36,9 @@ pub use unknown::{Cells, UnknownColumn};
 
 /// One recording: columns of equal length, one value a row.
 ///
-/// As read, `t_s` is strictly increasing, and `t_s`, `rate_dps`, `table_deg`, `xc_v`, `xs_v`, `yc_v`, `ys_v` and
-/// `theta_deg` are finite wherever they are there; `vas_v`, `vqc_v` and `temp_c` are NaN where the file has no number.
+/// As read, `t_s` is strictly increasing, and `t_s`, `rate_dps`, `table_deg`, `xc_v`, `xs_v`, `yc_v`, `ys_v`,
+/// `theta_deg`, `x_v` and `y_v` are finite wherever they are there; `vas_v`, `vqc_v`, `temp_c`, `fx_v` and `fy_v` are NaN
+/// where the file has no number.
 /// Angles are wrapped as in the file.
 #[derive(Debug, Clone, Default)]
 pub struct Recording {
@@ -65,6 +66,16 @@ pub struct Recording {
     pub vqc_v: Option<Vec<f64>>,
     /// Temperature, °C.
     pub temp_c: Option<Vec<f64>>,
+    /// Displacement of X itself, at several points a period of the carrier, in any unit.
+    pub x_v: Option<Vec<f64>>,
+    /// Displacement of Y itself.
+    pub y_v: Option<Vec<f64>>,
+    /// Force on X itself, V.
+    pub fx_v: Option<Vec<f64>>,
+    /// Force on Y itself, V.
+    pub fy_v: Option<Vec<f64>>,
+    /// Frequency that the envelope refers to, Hz, where it was demodulated from `x_v` and `y_v`.
+    pub reference_hz: Option<f64>,
     /// Columns of unknown meaning, in the order of the file.
     pub unknown: Vec<UnknownColumn>,
     /// Names of all columns in the order in which they are written: first those named here, then the others that are
@@ -92,6 +103,10 @@ impl Recording {
             Channel::Vas => &self.vas_v,
             Channel::Vqc => &self.vqc_v,
             Channel::Temperature => &self.temp_c,
+            Channel::X => &self.x_v,
+            Channel::Y => &self.y_v,
+            Channel::Fx => &self.fx_v,
+            Channel::Fy => &self.fy_v,
         };
         column.as_deref()
     }
@@ -113,6 +128,10 @@ impl Recording {
             Channel::Vas => &mut self.vas_v,
             Channel::Vqc => &mut self.vqc_v,
             Channel::Temperature => &mut self.temp_c,
+            Channel::X => &mut self.x_v,
+            Channel::Y => &mut self.y_v,
+            Channel::Fx => &mut self.fx_v,
+            Channel::Fy => &mut self.fy_v,
         };
         *column = Some(values);
     }

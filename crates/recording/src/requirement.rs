@@ -7,14 +7,17 @@ use super::campaign::{Instrument, Reference};
 use super::channel::Channel;
 use super::error::ReadError;
 
-const ANGLE: &str = "`t_s` and one of (`xc_v` with `yc_v`, `theta_deg`)";
-const ROTATION: &str = "`t_s`, one of (`rate_dps`, `table_deg`) and one of (`xc_v` with `yc_v`, `theta_deg`)";
+const ANGLE: &str = "`t_s` and one of (`xc_v` with `yc_v`, `theta_deg`, `x_v` with `y_v`)";
+const ROTATION: &str =
+    "`t_s`, one of (`rate_dps`, `table_deg`) and one of (`xc_v` with `yc_v`, `theta_deg`, `x_v` with `y_v`)";
 const CHANNELS: &str = "`t_s`, `xc_v` and `yc_v`";
 const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`";
+const DECAY: &str = "`t_s` and one of (`xc_v` with `xs_v`, `yc_v` and `ys_v`; `x_v` with `y_v`)";
 
 /// Whether a set of channels holds the time and an angle: the least that makes a recording.
 pub(super) fn holds_an_angle(has: impl Fn(Channel) -> bool) -> bool {
-    has(Channel::Time) && (has(Channel::Theta) || (has(Channel::Xc) && has(Channel::Yc)))
+    let pair = |x, y| has(x) && has(y);
+    has(Channel::Time) && (has(Channel::Theta) || pair(Channel::Xc, Channel::Yc) || pair(Channel::X, Channel::Y))
 }
 
 /// What `holds_an_angle` wants, in words.
@@ -24,7 +27,7 @@ pub(super) const fn angle_in_words() -> &'static str {
 
 impl Recording {
     /// Whether the columns of a rotation run are there: `t_s`, one of (`rate_dps`, `table_deg`), and one of (`xc_v` with
-    /// `yc_v`, `theta_deg`).
+    /// `yc_v`, `theta_deg`, `x_v` with `y_v`).
     ///
     /// # Errors
     /// [`ReadError::MissingColumns`] says what is needed and what is there.
@@ -56,6 +59,16 @@ impl Recording {
         let has = |channel| self.channel(channel).is_some();
         let whole = has(Channel::Xc) && has(Channel::Yc) && has(Channel::Vas);
         self.require(whole, "a ring-down", RINGDOWN)
+    }
+
+    /// Whether the columns of a free decay are there: `t_s`, and `xc_v`, `xs_v`, `yc_v`, `ys_v` or `x_v`, `y_v`.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumns`] says what is needed and what is there.
+    pub fn require_decay(&self) -> Result<(), ReadError> {
+        let all = |channels: &[Channel]| channels.iter().all(|channel| self.channel(*channel).is_some());
+        let whole = all(&[Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys]) || all(&[Channel::X, Channel::Y]);
+        self.require(whole, "a free decay", DECAY)
     }
 
     fn require(&self, whole: bool, needed_for: &'static str, needed: &'static str) -> Result<(), ReadError> {

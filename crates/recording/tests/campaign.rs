@@ -252,3 +252,24 @@ fn reference_and_temperature_are_read_and_written_again() {
     assert_refused(&headed(&format!("temperature_c = -300\n{RUN}")), &["`temperature_c` is -300"]);
     assert_refused(&headed(&format!("reference = \"lost\"\n{RUN}")), &["\"measured\" or \"commanded\" or \"none\""]);
 }
+
+#[test]
+fn a_decay_needs_its_envelopes_or_the_carrier_and_keeps_the_rate_it_is_given() {
+    let folder = tempfile::tempdir().expect("a folder of the test's own");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("it is written");
+    write("film.csv", "t_s,x_v,y_v\n0,1,2\n1,2,3\n");
+    write("half.csv", "t_s,xc_v,yc_v\n0,1,2\n1,2,3\n");
+    let campaign = |file: &str| {
+        format!("[campaign]\ndevice = \"d\"\n[[run]]\nkind = \"decay\"\nfile = \"{file}\"\nrate_dps = 0.003\n")
+    };
+    write("film.toml", &campaign("film.csv"));
+    let opened = Campaign::open(&folder.path().join("film.toml")).expect("a decay at the carrier");
+    assert_eq!(
+        (opened.runs[0].kind, opened.runs[0].recording.rate_dps.clone()),
+        (RunKind::Decay, Some(vec![0.003; 2]))
+    );
+    assert!(opened.to_toml().contains("kind = \"decay\""));
+    write("half.toml", &campaign("half.csv"));
+    let refused = Campaign::open(&folder.path().join("half.toml")).expect_err("no quadrature").to_string();
+    assert!(refused.contains("a free decay needs"), "{refused}");
+}

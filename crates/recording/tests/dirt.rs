@@ -264,7 +264,10 @@ fn text_that_is_not_utf_8_is_refused_where_it_stands() {
 #[test]
 fn a_file_without_time_or_angle_is_refused_with_what_is_there() {
     let message = refusal("time,xc_v,ys_v\n0,1,0\n");
-    assert!(message.contains("needs `t_s` and one of (`xc_v` with `yc_v`, `theta_deg`)"), "{message}");
+    assert!(
+        message.contains("needs `t_s` and one of (`xc_v` with `yc_v`, `theta_deg`, `x_v` with `y_v`)"),
+        "{message}"
+    );
     assert!(message.contains("there are `time`, `xc_v`, `ys_v`"), "{message}");
 }
 

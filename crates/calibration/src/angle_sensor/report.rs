@@ -160,6 +160,7 @@ pub(crate) fn report(
         proposals: Vec::new(),
         scale_factor: None,
         allan: None,
+        decay: None,
         warnings,
     };
     let figures =

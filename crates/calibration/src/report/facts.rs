@@ -78,6 +78,16 @@ impl Estimate {
         Self { ci95: [self.ci95[0] - by, self.ci95[1] + by], ..self }
     }
 
+    /// Of what is not told: no number.
+    pub fn unknown() -> Self {
+        Self { value: f64::NAN, ci95: [f64::NAN; 2] }
+    }
+
+    /// There is a number.
+    pub fn is_told(&self) -> bool {
+        self.value.is_finite()
+    }
+
     /// Half the width of the interval.
     pub fn half_width(&self) -> f64 {
         0.5 * (self.ci95[1] - self.ci95[0])
@@ -329,6 +339,41 @@ pub struct ScaleFactor {
     pub asymmetry_ppm: Estimate,
 }
 
+/// What decays without any loop tell of a resonator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DecayReport {
+    /// 1/τ, 1/s
+    pub damping_per_s: Estimate,
+    /// τ, s
+    pub tau_s: Estimate,
+    /// precession of the pattern by the input rotation, θ̇ = −kΩ, at the mean rate of the runs, deg/h
+    pub precession_dph: Estimate,
+    /// the same under the paper's model alone
+    pub precession_dph_declared: Estimate,
+    /// frequency of the vibration, Hz, mean over the runs; null where the recordings are envelopes
+    pub carrier_hz: Option<f64>,
+    /// dω/dE, rad/s/V²; null where frequency does not follow energy
+    pub frequency_per_energy: Option<Estimate>,
+    /// the pattern was seen at angles that tell anisotropies from what does not depend on direction
+    pub many_angles: bool,
+    /// angle error of whole decays, deg rms: by a constant rate, by the paper's model, after all
+    pub rms_deg: [f64; 3],
+}
+
+/// An estimate that may be none, written as null.
+mod told {
+    use super::Estimate;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(e: &Estimate, to: S) -> Result<S::Ok, S::Error> {
+        e.is_told().then_some(e).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Estimate, D::Error> {
+        Ok(Option::deserialize(from)?.unwrap_or_else(Estimate::unknown))
+    }
+}
+
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -346,7 +391,8 @@ pub struct Report {
     pub device: String,
     /// gyroscope or sensor
     pub instrument: String,
-    /// k
+    /// k; null, and not a number here, where the campaign cannot tell
+    #[serde(with = "told")]
     pub angular_gain: Estimate,
     /// G_Dy/G_Dx; null where the campaign cannot tell
     pub detection_gain_ratio: Option<Estimate>,
@@ -374,6 +420,9 @@ pub struct Report {
     pub scale_factor: Option<ScaleFactor>,
     /// how far the angle wanders at rest; null without a run at rest
     pub allan: Option<Allan>,
+    /// what free decays tell; absent without them
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<DecayReport>,
     /// what a reader must know
     pub warnings: Vec<String>,
 }

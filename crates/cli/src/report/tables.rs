@@ -59,7 +59,7 @@ fn parameters(h: &mut String, identified: &Identification) {
             }
             None => row(h, &[name, "not told by this campaign", "", "1"]),
         };
-        estimate("angular gain k (scale factor)", Some(&r.angular_gain));
+        estimate("angular gain k (scale factor)", Some(&r.angular_gain).filter(|k| k.is_told()));
         estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref());
         if r.instrument == "gyroscope" {
             estimate("actuation gain ratio G<sub>Ax</sub>/G<sub>Ay</sub>", r.actuation_gain_ratio.as_ref());

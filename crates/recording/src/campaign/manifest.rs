@@ -59,6 +59,7 @@ enum Kind {
     Rotation,
     Ringdown,
     Static,
+    Decay,
 }
 
 /// A refusal of a ring-down where there are no mechanics.
@@ -91,6 +92,7 @@ const CAMPAIGN_KEYS: &[&str] =
     &["device", "instrument", "carrier_hz", "angular_gain", "period_deg", "reference", "pole_pairs", "temperature_c"];
 const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
 const STATIC_KEYS: &[&str] = &["kind", "file", "settle_s"];
+const DECAY_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
 const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
 
 /// No temperature is below, °C.
@@ -212,33 +214,43 @@ impl Text<'_> {
             };
             entries.push(self.run(table, run.span(), instrument)?);
         }
-        let is_rotation = |entry: &&Entry| entry.kind == RunKind::Rotation;
+        let is_rotation = |entry: &Entry| entry.kind == RunKind::Rotation;
         if !entries.is_empty() && entries.iter().all(|entry| entry.kind == RunKind::Static) {
             return Ok(entries);
         }
-        if !entries.iter().any(|entry| is_rotation(&entry)) {
+        let is_decay = |entry: &Entry| entry.kind == RunKind::Decay;
+        if !entries.iter().any(|entry| is_rotation(entry) || is_decay(entry)) {
             return Err(self.refuse(runs.span(), "no run is a rotation", WANTED));
         }
-        if entries.iter().filter(is_rotation).all(|entry| entry.role == Role::Holdout) {
-            let what = "every rotation run has `use = \"holdout\"`, so that nothing is left to fit";
-            return Err(self.refuse(runs.span(), what, "a rotation run with `use = \"fit\"`, the default"));
+        for (kind, is_kind) in [("rotation", &is_rotation as &dyn Fn(&Entry) -> bool), ("decay", &is_decay)] {
+            let mut alike = entries.iter().filter(|entry| is_kind(entry)).peekable();
+            if alike.peek().is_some() && alike.all(|entry| entry.role == Role::Holdout) {
+                let what = format!("every {kind} run has `use = \"holdout\"`, so that nothing is left to fit");
+                return Err(self.refuse(runs.span(), what, format!("a {kind} run with `use = \"fit\"`, the default")));
+            }
         }
         Ok(entries)
     }
 
     fn run(&self, table: &DeTable<'_>, span: Range<usize>, instrument: Instrument) -> Result<Entry, ReadError> {
-        let kinds = [("rotation", Kind::Rotation), ("ringdown", Kind::Ringdown), ("static", Kind::Static)];
+        let kinds = [
+            ("rotation", Kind::Rotation),
+            ("ringdown", Kind::Ringdown),
+            ("static", Kind::Static),
+            ("decay", Kind::Decay),
+        ];
         let Some(kind) = self.choice(table, "kind", &kinds)? else {
-            let wanted = "`kind = \"rotation\"`, `kind = \"ringdown\"` or `kind = \"static\"`";
+            let wanted = "`kind = \"rotation\"`, `kind = \"ringdown\"`, `kind = \"static\"` or `kind = \"decay\"`";
             return Err(self.refuse(span, "this run has no `kind`", wanted));
         };
-        if kind == Kind::Ringdown && instrument == Instrument::Sensor {
+        if matches!(kind, Kind::Ringdown | Kind::Decay) && instrument == Instrument::Sensor {
             return Err(ringdown_of_a_sensor(self.path, self.position(&span)));
         }
         let (keys, place) = match kind {
             Kind::Rotation => (ROTATION_KEYS, "in a rotation run"),
             Kind::Ringdown => (RINGDOWN_KEYS, "in a ring-down"),
             Kind::Static => (STATIC_KEYS, "in a run at rest"),
+            Kind::Decay => (DECAY_KEYS, "in a free decay"),
         };
         self.refuse_unknown(table, keys, place)?;
         let Some(file) = get(table, "file") else {
@@ -256,6 +268,7 @@ impl Text<'_> {
         let kind = match kind {
             Kind::Rotation => RunKind::Rotation,
             Kind::Static => RunKind::Static,
+            Kind::Decay => RunKind::Decay,
             Kind::Ringdown => RunKind::Ringdown {
                 angle_deg: required("angle_deg", "the angle in degrees at which the pattern is held", |_| true)?,
                 energy_off_s: required(

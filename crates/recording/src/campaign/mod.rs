@@ -50,6 +50,8 @@ pub enum RunKind {
     },
     /// The instrument stood still.
     Static,
+    /// The resonator rang freely, without any loop.
+    Decay,
 }
 
 impl RunKind {
@@ -60,6 +62,7 @@ impl RunKind {
             Self::Rotation => "rotation",
             Self::Ringdown { .. } => "ringdown",
             Self::Static => "static",
+            Self::Decay => "decay",
         }
     }
 }
@@ -241,6 +244,7 @@ impl Campaign {
                 RunKind::Ringdown { .. } => recording.require_ringdown()?,
                 // every recording has an angle
                 RunKind::Static => {}
+                RunKind::Decay => recording.require_decay()?,
             }
             if runs.iter().any(|other| other.recording.source == file) {
                 warnings.push(format!(

@@ -1,0 +1,150 @@
+//! Recordings at the carrier: displacements at several points a period, as an oscilloscope or a camera saves them. The
+//! carrier is found, followed and demodulated, window by window, and what comes out is a recording of envelopes as any
+//! other. Nothing is held beside the columns that were read but the envelopes.
+
+mod found;
+mod windows;
+
+use std::ops::Range;
+
+use cvg_model::Envelope;
+
+use crate::data::track::wrapped;
+use crate::error::Refusal;
+use crate::recording::{Campaign, Channel, Recording, RunKind};
+use windows::Window;
+pub(crate) use windows::phased;
+
+/// Windows that a recording is divided into at most.
+pub(crate) const MOST_WINDOWS: usize = 12_000;
+
+/// A campaign whose carrier-level recordings are demodulated.
+///
+/// # Errors
+/// A recording in which there is no carrier, or too few points of one.
+pub(crate) fn demodulated(mut campaign: Campaign) -> Result<Campaign, Refusal> {
+    for run in &mut campaign.runs {
+        let r = &run.recording;
+        if r.xc_v.is_some() || r.theta_deg.is_some() || r.x_v.is_none() || r.y_v.is_none() {
+            continue;
+        }
+        let name = run.file.display().to_string();
+        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz)?;
+        run.recording = if run.kind == RunKind::Decay { envelopes } else { in_phase(envelopes) };
+    }
+    Ok(campaign)
+}
+
+/// The columns of a carrier.
+#[derive(Clone, Copy)]
+pub(crate) struct Carrier<'a> {
+    pub(crate) t_s: &'a [f64],
+    pub(crate) x: &'a [f64],
+    pub(crate) y: &'a [f64],
+}
+
+impl Carrier<'_> {
+    /// Mean time from row to row, s.
+    pub(crate) fn step_s(&self) -> f64 {
+        let n = self.t_s.len();
+        (self.t_s[n - 1] - self.t_s[0]) / (n.max(2) - 1) as f64
+    }
+}
+
+fn recording(r: Recording, name: &str, stated_hz: Option<f64>) -> Result<Recording, Refusal> {
+    let (Some(x), Some(y)) = (&r.x_v, &r.y_v) else { return Ok(r) };
+    let carrier = Carrier { t_s: &r.t_s, x, y };
+    let frequency_hz = found::frequency(carrier, name, stated_hz)?;
+    let seen = windows::demodulate(carrier, frequency_hz);
+    if seen.len() < 2 {
+        return Err(Refusal::no_answer(
+            name,
+            format!("the carrier of {frequency_hz:.6} Hz is not resolved by {} rows", r.len()),
+            "more periods, or more points a period",
+        ));
+    }
+    let mut out = Recording {
+        source: r.source.clone(),
+        warnings: r.warnings.clone(),
+        dropped: r.dropped.clone(),
+        reference_hz: Some(frequency_hz),
+        t_s: seen.iter().map(|w| w.t_s).collect(),
+        xc_v: Some(seen.iter().map(|w| w.envelope.x_c).collect()),
+        xs_v: Some(seen.iter().map(|w| w.envelope.x_s).collect()),
+        yc_v: Some(seen.iter().map(|w| w.envelope.y_c).collect()),
+        ys_v: Some(seen.iter().map(|w| w.envelope.y_s).collect()),
+        ..Recording::default()
+    };
+    for channel in [Channel::Rate, Channel::Table, Channel::Vas, Channel::Vqc, Channel::Temperature] {
+        if let Some(values) = r.channel(channel) {
+            let angle = channel == Channel::Table;
+            out.set_channel(channel, seen.iter().map(|w| mean(values, &w.rows, angle)).collect());
+        }
+    }
+    out.warnings.extend(remarks(&r, name, frequency_hz, &seen));
+    Ok(out)
+}
+
+/// The mean of a column over some rows; an angle is taken relative to its first row, which may be wrapped.
+fn mean(values: &[f64], rows: &Range<usize>, angle: bool) -> f64 {
+    let of = &values[rows.clone()];
+    let first = of.first().copied().unwrap_or(f64::NAN);
+    let relative = |v: &f64| if angle { wrapped(v - first, 360.0) } else { v - first };
+    first + of.iter().map(relative).sum::<f64>() / of.len().max(1) as f64
+}
+
+fn remarks(r: &Recording, name: &str, frequency_hz: f64, seen: &[Window]) -> Vec<String> {
+    let rows: usize = seen.iter().map(|w| w.rows.len()).sum();
+    let each = rows / seen.len().max(1);
+    let length_s = (r.t_s[r.len() - 1] - r.t_s[0]) / seen.len() as f64;
+    let mut out = vec![format!(
+        "{name}: demodulated at {frequency_hz:.6} Hz, {} envelopes of {each} rows each; what changes faster than {:.4} Hz \
+         is not resolved",
+        seen.len(),
+        0.5 / length_s
+    )];
+    if r.fx_v.is_some() || r.fy_v.is_some() {
+        out.push(format!("{name}: the forces fx_v and fy_v are not used"));
+    }
+    out
+}
+
+/// Envelopes whose phase a loop would have nulled: each turned by the phase of its own orbit.
+fn in_phase(mut r: Recording) -> Recording {
+    let (Some(xc), Some(xs), Some(yc), Some(ys)) = (&mut r.xc_v, &mut r.xs_v, &mut r.yc_v, &mut r.ys_v) else {
+        return r;
+    };
+    let mut last = 0.0;
+    for i in 0..xc.len() {
+        let e = Envelope::new(xc[i], xs[i], yc[i], ys[i]);
+        // half a period later the orbit is the same one, seen from its other end
+        last += wrapped(e.orbit().delta - last, std::f64::consts::PI);
+        let z = windows::phased(&e, -last);
+        (xc[i], xs[i], yc[i], ys[i]) = (z.x_c, z.x_s, z.y_c, z.y_s);
+    }
+    r
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rotation_is_seen_with_its_phase_nulled() {
+        let orbit = cvg_model::Orbit { a: 1.0, q: 0.05, theta: 0.4, delta: 0.0 }.envelope();
+        let column = |of: fn(&Envelope<f64>) -> f64| {
+            Some((0..200).map(|i| of(&windows::phased(&orbit, 0.05 * f64::from(i)))).collect::<Vec<_>>())
+        };
+        let r = in_phase(Recording {
+            t_s: (0..200).map(f64::from).collect(),
+            xc_v: column(|e| e.x_c),
+            xs_v: column(|e| e.x_s),
+            yc_v: column(|e| e.y_c),
+            ys_v: column(|e| e.y_s),
+            ..Recording::default()
+        });
+        for (of, expected) in [(&r.xc_v, orbit.x_c), (&r.xs_v, orbit.x_s), (&r.yc_v, orbit.y_c), (&r.ys_v, orbit.y_s)] {
+            assert!(of.iter().flatten().all(|v| (v - expected).abs() < 1e-9));
+        }
+    }
+}

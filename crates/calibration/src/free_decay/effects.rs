@@ -1,0 +1,163 @@
+//! What decays told, in the words of the library of effects.
+
+use cvg_model::effects::EffectId;
+
+use super::fit::Fit;
+use super::model::Term;
+use super::report::{Finding, estimate, shown, whole, whole_raw};
+use super::runs::DecayRun;
+use super::selection::{Added, BELIEVED, is_declared};
+use crate::model::hypothesis::Origin;
+use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport, Rival};
+
+/// An isotropic nonlinear spring: θ̇ += c·Q, and a frequency that goes with E.
+const SPRING: &str = "spring-isotropic";
+/// Damping that grows with the square of the amplitude; of no effect of the library.
+const DAMPING_GROWTH: &str = "damping-nonlinear";
+
+/// The effect that a term stands for.
+pub(crate) fn name(term: Term) -> &'static str {
+    match term {
+        Term::Damping => "damping",
+        Term::DampingAlong | Term::DampingAcross => EffectId::Anisodamping.description().id,
+        Term::SplitAlong | Term::SplitAcross => EffectId::Anisoelasticity.description().id,
+        Term::AngularGain | Term::Precession => "precession",
+        Term::Spring => SPRING,
+        Term::DampingGrowth => DAMPING_GROWTH,
+        Term::GainRatio => EffectId::DetectionGainMismatch.description().id,
+        Term::Skew => EffectId::DetectionSkew.description().id,
+    }
+}
+
+/// Those that were tried beside a term, with what they gained less.
+pub(crate) fn rivals(added: &Added) -> Vec<Rival> {
+    added.rivals.iter().map(|(t, gain)| Rival { id: name(*t).into(), beaten_by: added.gain - gain }).collect()
+}
+
+/// All effects of a finding.
+pub(crate) fn effects(finding: &Finding, runs: &[DecayRun]) -> Vec<EffectReport> {
+    let (fit, model) = (&finding.fit, &finding.fit.model);
+    let mut out = Vec::new();
+    if model.has(Term::DampingAlong) {
+        out.push(anisotropy(fit, EffectId::Anisodamping, [Term::DampingAlong, Term::DampingAcross]));
+    }
+    if model.has(Term::SplitAlong) {
+        out.push(anisotropy(fit, EffectId::Anisoelasticity, [Term::SplitAlong, Term::SplitAcross]));
+    } else {
+        out.push(split_across(fit));
+    }
+    if model.has(Term::GainRatio) {
+        let e = estimate(fit, Term::GainRatio);
+        let ratio = Estimate { value: 1.0 + e.value, ci95: e.ci95.map(|end| 1.0 + end) };
+        let parameter = &EffectId::DetectionGainMismatch.description().parameters[0];
+        out.push(plain(finding, Term::GainRatio, vec![entry(parameter.name, parameter.unit, ratio)], runs));
+    }
+    if model.has(Term::Skew) {
+        let parameter = &EffectId::DetectionSkew.description().parameters[0];
+        let value = entry(parameter.name, parameter.unit, estimate(fit, Term::Skew));
+        out.push(plain(finding, Term::Skew, vec![value], runs));
+    }
+    if model.has(Term::Spring) {
+        let mut parameters = vec![entry("c", "rad/s/V^2", estimate(fit, Term::Spring))];
+        if let Some(p) = finding.phase.as_ref().filter(|p| p.gain > BELIEVED) {
+            parameters.push(entry("frequency_per_energy", "rad/s/V^2", Estimate::new(p.per_energy.0, p.per_energy.1)));
+        }
+        out.push(plain(finding, Term::Spring, parameters, runs));
+    }
+    if model.has(Term::DampingGrowth) {
+        let value = entry("gamma", "1/s/V^2", estimate(fit, Term::DampingGrowth));
+        out.push(plain(finding, Term::DampingGrowth, vec![value], runs));
+    }
+    out
+}
+
+fn entry(name: &str, unit: &str, e: Estimate) -> ParameterReport {
+    ParameterReport { name: name.into(), unit: unit.into(), value: e.value, ci95: Some(e.ci95) }
+}
+
+/// Both components of an anisotropy, as magnitude and axis.
+fn anisotropy(fit: &Fit, id: EffectId, [along, across]: [Term; 2]) -> EffectReport {
+    let at = |term: Term| fit.model.terms.iter().position(|t| *t == term);
+    let (a, b) = (fit.model.value(along), fit.model.value(across));
+    let (va, vb, vab) = match (at(along), at(across)) {
+        (Some(i), Some(j)) => (fit.covariance[(i, i)], fit.covariance[(j, j)], fit.covariance[(i, j)]),
+        _ => (0.0, 0.0, 0.0),
+    };
+    let size = a.hypot(b).max(f64::MIN_POSITIVE);
+    let deviation = (a * a * va + b * b * vb + 2.0 * a * b * vab).max(0.0).sqrt() / size;
+    let turn = (b * b * va + a * a * vb - 2.0 * a * b * vab).max(0.0).sqrt() / (size * size);
+    let (magnitude, unit, angle, division) = shown(id).unwrap_or(("magnitude", "1/s", "axis", 2.0));
+    let axis = b.atan2(a) / division + fit.model.axis_rad;
+    let quarter = std::f64::consts::PI / division;
+    let axis = crate::data::track::wrapped(axis, 2.0 * quarter);
+    EffectReport {
+        id: id.description().id.into(),
+        origin: Origin::Declared,
+        parameters: vec![
+            entry(magnitude, unit, Estimate::new(size, deviation)),
+            entry(angle, "deg", Estimate::new(axis.to_degrees(), (turn / division).to_degrees())),
+        ],
+        heldout_rms_deg: None,
+        evidence: "declared; from the equation of motion, fitted to E, Q and θ of all decays at once".into(),
+        confounded_with: Vec::new(),
+        separated_by: None,
+    }
+}
+
+/// The one component of a split that a pattern near one angle shows.
+fn split_across(fit: &Fit) -> EffectReport {
+    EffectReport {
+        id: EffectId::Anisoelasticity.description().id.into(),
+        origin: Origin::Declared,
+        parameters: vec![entry("anisoelasticity_across", "rad/s", estimate(fit, Term::SplitAcross))],
+        heldout_rms_deg: None,
+        evidence: format!(
+            "declared; Δω sin 2(θ_ω − θ) at the pattern's mean angle of {:.2}°, from the growth of quadrature: the other \
+             component does not show there",
+            fit.model.axis_rad.to_degrees()
+        ),
+        confounded_with: Vec::new(),
+        separated_by: Some("decays at several starting angles".into()),
+    }
+}
+
+/// An effect that was added because the likelihood pays for it.
+fn plain(finding: &Finding, term: Term, parameters: Vec<ParameterReport>, runs: &[DecayRun]) -> EffectReport {
+    let added = finding.chosen.added.iter().find(|a| a.term == term);
+    let errors = &finding.errors;
+    let rms = |e: f64| format!("{e:.4}°");
+    let beaten: Vec<String> =
+        added.map(rivals).unwrap_or_default().iter().map(|r| format!("{} by {:.0}", r.id, r.beaten_by)).collect();
+    let scaling = match term {
+        Term::Spring => "precession in proportion to quadrature as the decays go down",
+        Term::DampingGrowth => "damping in proportion to energy as the decays go down",
+        _ => "(E, R, S, Q) of all angles as this readout maps them",
+    };
+    let evidence = format!(
+        "{scaling}: gains {:.0} in 2 ln likelihood after its price{}{}; of the angle of whole decays {} are left with it, {} \
+         with the paper's model, {} by a constant rate",
+        added.map_or(0.0, |a| a.gain),
+        if beaten.is_empty() { "" } else { ", beats " },
+        beaten.join(", "),
+        rms(whole(runs, &finding.fit).size().rms_deg),
+        rms(whole(runs, &finding.declared).size().rms_deg),
+        rms(whole_raw(runs, &finding.fit).size().rms_deg),
+    );
+    let confounded: Vec<String> =
+        added.map(|a| a.not_ruled_out().map(|t| name(t).to_owned()).collect()).unwrap_or_default();
+    EffectReport {
+        id: name(term).into(),
+        origin: match term {
+            Term::DampingGrowth => Origin::Empirical,
+            t if is_declared(t) => Origin::Declared,
+            _ => Origin::Discovered,
+        },
+        parameters,
+        heldout_rms_deg: (!is_declared(term))
+            .then(|| BeforeAfter { before: errors.declared.size().rms_deg, after: errors.after.size().rms_deg }),
+        evidence,
+        separated_by: (!confounded.is_empty())
+            .then(|| "decays at several starting angles, and of several amplitudes".to_owned()),
+        confounded_with: confounded,
+    }
+}

@@ -1,0 +1,180 @@
+//! The main job for free decays: runs made ready, terms chosen on the fitted part, the held-out part read once, and the
+//! values that leave the program fitted to all that may be fitted.
+
+use super::errors::{Part, after, raw};
+use super::fit::{Data, Fit, fit};
+use super::model::Start;
+use super::phase::phase;
+use super::report::{Errors, Finding, report};
+use super::runs::DecayRun;
+use super::selection::{choose, is_declared, is_sound};
+use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
+use crate::error::Refusal;
+use crate::identification::{Identification, Options, run_report};
+use crate::recording::{Campaign, RunKind};
+use crate::report::provenance;
+use crate::report::{Input, RunReport};
+
+/// A campaign of decays alone.
+pub(crate) fn serves(campaign: &Campaign) -> bool {
+    !campaign.runs.is_empty() && campaign.runs.iter().all(|r| r.kind == RunKind::Decay)
+}
+
+/// A campaign without its decays, and its decays, where it has both.
+pub(crate) fn apart(mut campaign: Campaign) -> (Campaign, Option<Campaign>) {
+    if serves(&campaign) || campaign.runs.iter().all(|r| r.kind != RunKind::Decay) {
+        return (campaign, None);
+    }
+    let runs = std::mem::take(&mut campaign.runs);
+    let (decays, others) = runs.into_iter().partition(|r| r.kind == RunKind::Decay);
+    let decays = Campaign { runs: decays, ..campaign.clone() };
+    campaign.runs = others;
+    (campaign, Some(decays))
+}
+
+/// Puts what decays tell beside what the other runs of a campaign told.
+pub(crate) fn beside(identified: &mut Identification, decays: Campaign, options: &Options<'_>) {
+    let runs: Vec<RunReport> = decays.runs.iter().map(run_report).collect();
+    let report = &mut identified.report;
+    match identify(decays, options, false) {
+        Ok(of_decays) => {
+            report.runs.extend(of_decays.report.runs);
+            for input in of_decays.report.inputs {
+                if !report.inputs.contains(&input) {
+                    report.inputs.push(input);
+                }
+            }
+            report.warnings.extend(of_decays.report.warnings);
+            report.warnings.push(
+                "the free decays were identified by themselves: what they tell stands under `decay`, and nothing of it is \
+                 taken into the calibration"
+                    .into(),
+            );
+            report.decay = of_decays.report.decay;
+        }
+        Err(refused) => {
+            report.runs.extend(runs);
+            report.warnings.push(format!("the free decays tell nothing: {refused}"));
+        }
+    }
+}
+
+/// What the campaign says of itself, kept while its recordings are taken apart.
+pub(crate) struct Head {
+    pub(crate) device: String,
+    pub(crate) stated_gain: Option<f64>,
+    pub(crate) references_hz: Vec<Option<f64>>,
+    pub(crate) runs: Vec<RunReport>,
+    pub(crate) inputs: Vec<Input>,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl Head {
+    fn of(campaign: &Campaign) -> Self {
+        Self {
+            device: campaign.device.clone(),
+            stated_gain: campaign.angular_gain,
+            references_hz: campaign.runs.iter().map(|r| r.recording.reference_hz).collect(),
+            runs: campaign.runs.iter().map(run_report).collect(),
+            inputs: provenance::sums(&provenance::files(campaign)),
+            warnings: campaign.all_warnings().map(str::to_owned).collect(),
+        }
+    }
+}
+
+/// Part of a run, in four parts, that is held out where no run is.
+const FITTED_QUARTERS: usize = 3;
+/// Standard errors of a root mean square by which one that is larger is so by no chance.
+const NO_CHANCE: f64 = 3.0;
+/// Held-out stretches below which an error says nothing.
+const FEWEST_HELD: usize = 16;
+
+/// Identifies a campaign that [`serves`].
+///
+/// # Errors
+/// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
+pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+    let mut head = Head::of(&campaign);
+    (options.progress)("preparing the decays");
+    let runs: Vec<DecayRun> =
+        campaign.runs.iter().enumerate().map(|(i, r)| DecayRun::new(i, r)).collect::<Result<_, _>>()?;
+    drop(campaign);
+    let (held, fitted): (Vec<DecayRun>, Vec<DecayRun>) = runs.into_iter().partition(|r| r.held);
+    if fitted.is_empty() {
+        return Err(Refusal::new("campaign", "no decay is left to fit", "a run with use = \"fit\""));
+    }
+    let whole: Vec<usize> = fitted.iter().map(DecayRun::len).collect();
+    let counts: Vec<usize> =
+        if held.is_empty() { whole.iter().map(|n| n * FITTED_QUARTERS / 4).collect() } else { whole.clone() };
+    let data = Data { runs: &fitted, counts: &counts };
+    (options.progress)("fitting the equation of motion");
+    let mut chosen = choose(data, options.discover, options.progress);
+    sound(&chosen.discovered, &head.device)?;
+    (options.progress)("measuring the held-out error");
+    let declared = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.declared);
+    let mut errors = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.discovered);
+    if errors.held_out() < FEWEST_HELD {
+        return Err(Refusal::no_answer(
+            &head.device,
+            "too few stretches are left to test an answer on",
+            "a longer decay, or a run with use = \"holdout\"",
+        ));
+    }
+    if worse(&errors) {
+        head.warnings.push(format!(
+            "what the paper's model lacks was not taken: on held-out data it leaves {:.4e}°, and without it {:.4e}° are left",
+            errors.after.size().rms_deg,
+            errors.declared.size().rms_deg
+        ));
+        chosen.added.retain(|a| is_declared(a.term));
+        chosen.discovered = chosen.declared.clone();
+        errors = declared;
+    }
+    (options.progress)("fitting what was chosen to all stretches");
+    let all = Data { runs: &fitted, counts: &whole };
+    let of_all = |f: &Fit| if held.is_empty() { fit(&f.model, &f.starts, all) } else { f.clone() };
+    let final_fit = of_all(&chosen.discovered);
+    sound(&final_fit, &head.device)?;
+    let final_declared =
+        if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };
+    let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
+    let finding = Finding { chosen, fit: final_fit, declared: final_declared, phase, errors };
+    report(head, &finding, &fitted, &held, pictured)
+}
+
+fn sound(fit: &Fit, device: &str) -> Result<(), Refusal> {
+    if is_sound(fit) {
+        return Ok(());
+    }
+    Err(Refusal::no_answer(
+        device,
+        "the equation of motion does not follow these decays",
+        "decays without loops or forces, longer ones, or at several starting angles",
+    ))
+}
+
+/// The held-out error is larger with what was discovered than without, and by no chance.
+fn worse(errors: &Errors) -> bool {
+    let count = errors.held_out();
+    let remembered = inflation(&autocorrelation(&errors.after, WHITENESS_LAGS), count);
+    let by_chance = NO_CHANCE * (remembered / (2.0 * count.max(1) as f64)).sqrt();
+    errors.after.size().rms_deg > errors.declared.size().rms_deg * (1.0 + by_chance)
+}
+
+impl Errors {
+    /// The errors of the held-out runs, or of the last quarter of all.
+    fn of(held: &[DecayRun], fitted: &[DecayRun], counts: &[usize], declared: &Fit, discovered: &Fit) -> Self {
+        let found = after(&parts(held, fitted, counts, discovered), &discovered.model, None);
+        let declared = after(&parts(held, fitted, counts, declared), &declared.model, Some(&found));
+        Self { raw: raw(&parts(held, fitted, counts, discovered), &found), declared, after: found }
+    }
+}
+
+/// The held-out runs, or what follows the first `counts` stretches of the fitted ones.
+fn parts<'a>(held: &'a [DecayRun], fitted: &'a [DecayRun], counts: &[usize], fit: &'a Fit) -> Vec<Part<'a>> {
+    if !held.is_empty() {
+        return held.iter().map(|run| Part { run, from: 0, start: None }).collect();
+    }
+    let of = |((run, from), start): ((&'a DecayRun, &usize), &'a Start)| Part { run, from: *from, start: Some(start) };
+    fitted.iter().zip(counts).zip(&fit.starts).map(of).collect()
+}

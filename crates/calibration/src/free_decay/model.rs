@@ -1,0 +1,177 @@
+//! A resonator that rings freely, as it is believed to be: which terms its equations have, and what a run then shows.
+
+use nalgebra::Matrix4;
+
+use super::runs::DecayRun;
+use super::stokes::{self, Mechanics, State};
+
+/// Something that a decay tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Term {
+    /// 1/τ, 1/s
+    Damping,
+    /// Δ(1/τ) along the model's axis and at 45° to it, 1/s
+    DampingAlong,
+    /// see [`Term::DampingAlong`]
+    DampingAcross,
+    /// Δω along the model's axis and at 45° to it, rad/s
+    SplitAlong,
+    /// see [`Term::SplitAlong`]
+    SplitAcross,
+    /// k, where the input rate is known
+    AngularGain,
+    /// θ̇, rad/s, where it is not
+    Precession,
+    /// c, rad/s/V²
+    Spring,
+    /// γ, 1/s/V²
+    DampingGrowth,
+    /// G_Dy/G_Dx − 1
+    GainRatio,
+    /// s
+    Skew,
+}
+
+/// Terms with their values; terms that are not there are 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Model {
+    pub(crate) terms: Vec<Term>,
+    pub(crate) values: Vec<f64>,
+    /// the axis that anisotropies are resolved along, rad
+    pub(crate) axis_rad: f64,
+}
+
+/// (R, S, Q) at the first instant of a run, V².
+pub(crate) type Start = [f64; 3];
+
+impl Model {
+    pub(crate) fn new(terms: Vec<Term>, axis_rad: f64) -> Self {
+        Self { values: vec![0.0; terms.len()], terms, axis_rad }
+    }
+
+    /// The same with a term more, absent yet.
+    pub(crate) fn with(&self, term: Term) -> Self {
+        let mut more = self.clone();
+        more.terms.push(term);
+        more.values.push(0.0);
+        more
+    }
+
+    pub(crate) fn has(&self, term: Term) -> bool {
+        self.terms.contains(&term)
+    }
+
+    pub(crate) fn value(&self, term: Term) -> f64 {
+        self.terms.iter().position(|t| *t == term).map_or(0.0, |at| self.values[at])
+    }
+
+    /// An anisotropy resolved along the model's axis, resolved along X–Y.
+    fn resolved(&self, along: Term, across: Term) -> [f64; 2] {
+        let (sin, cos) = (2.0 * self.axis_rad).sin_cos();
+        let (a, b) = (self.value(along), self.value(across));
+        [a * cos - b * sin, a * sin + b * cos]
+    }
+
+    /// θ̇ of the input rotation, rad/s.
+    pub(crate) fn precession(&self, rate_rad_s: f64) -> f64 {
+        self.value(Term::Precession) - self.value(Term::AngularGain) * rate_rad_s
+    }
+
+    pub(crate) fn mechanics(&self, rate_rad_s: f64) -> Mechanics {
+        Mechanics {
+            damping_per_s: self.value(Term::Damping),
+            anisodamping: self.resolved(Term::DampingAlong, Term::DampingAcross),
+            anisoelasticity: self.resolved(Term::SplitAlong, Term::SplitAcross),
+            precession_rad_s: self.precession(rate_rad_s),
+            spring: self.value(Term::Spring),
+            damping_growth: self.value(Term::DampingGrowth),
+        }
+    }
+
+    /// What the first `count` samples of a run show if it began so. Linear mechanics exactly, nonlinear ones in between
+    /// (Strang), which is exact as far as they commute: to 2e-4 of themselves where either turns the orbit by 2° a sample.
+    pub(crate) fn predict(&self, run: &DecayRun, start: &Start, count: usize) -> Vec<State> {
+        let readout = (self.has(Term::GainRatio) || self.has(Term::Skew))
+            .then(|| stokes::readout(1.0 + self.value(Term::GainRatio), self.value(Term::Skew)));
+        let mut step: Option<Step> = None;
+        let mut u = pure(start);
+        let mut out = Vec::with_capacity(count);
+        for i in 0..count.min(run.len()) {
+            let dt_s = if i == 0 { 0.0 } else { run.t_s[i] - run.t_s[i - 1] };
+            let rate = run.rate_rad_s[i];
+            let now = match step.take() {
+                Some(s) if s.serves(dt_s, rate) || (i == 0) => s,
+                _ => Step::new(self.mechanics(rate), rate, dt_s, run.span_s),
+            };
+            if i > 0 {
+                let half = now.mechanics.nonlinear(&u, 0.5 * dt_s);
+                u = now.mechanics.nonlinear(&(now.over * half), 0.5 * dt_s);
+            }
+            let mean = now.mean * u;
+            out.push(readout.map_or(mean, |m| m * mean));
+            step = Some(now);
+        }
+        out
+    }
+
+    /// The envelopes (x_c, x_s, y_c, y_s) of the same, in the phase in which the mechanics alone leave it.
+    pub(crate) fn envelopes(&self, run: &DecayRun, start: &Start) -> Vec<State> {
+        let orbit = cvg_model::Pendulum { e: pure(start)[0], r: start[0], s: start[1], q: start[2], l: 0.0 };
+        let size = orbit.e.max(f64::MIN_POSITIVE);
+        let (minor, theta) = (orbit.q / size, orbit.angle());
+        // a² + q² = E and 2aq = Q
+        let a = (0.5 * size * (1.0 + (1.0 - minor * minor).max(0.0).sqrt())).sqrt();
+        let e = cvg_model::Orbit { a, q: 0.5 * orbit.q / a, theta, delta: 0.0 }.envelope();
+        let mut z = State::new(e.x_c, e.x_s, e.y_c, e.y_s);
+        let mut out = Vec::with_capacity(run.len());
+        for i in 0..run.len() {
+            if i > 0 {
+                let (dt_s, m) = (run.t_s[i] - run.t_s[i - 1], self.mechanics(run.rate_rad_s[i]));
+                let half = turned(&m, &z, 0.5 * dt_s);
+                z = turned(&m, &((m.envelope_generator() * dt_s).exp() * half), 0.5 * dt_s);
+            }
+            out.push(z);
+        }
+        out
+    }
+}
+
+/// An envelope turned by the precession cQ.
+fn turned(m: &Mechanics, z: &State, dt_s: f64) -> State {
+    if m.spring == 0.0 {
+        return *z;
+    }
+    let e = cvg_model::Envelope::new(z[0], z[1], z[2], z[3]);
+    let (sin, cos) = (m.spring * e.pendulum().q * dt_s).sin_cos();
+    let e = e.turned(sin, cos);
+    State::new(e.x_c, e.x_s, e.y_c, e.y_s)
+}
+
+/// (E, R, S, Q) of a vibration that is all in phase with itself: E² = R² + S² + Q².
+fn pure(&[r, s, q]: &Start) -> State {
+    State::new((r * r + s * s + q * q).sqrt(), r, s, q)
+}
+
+/// One step of the linear mechanics, kept as long as steps are alike.
+struct Step {
+    mechanics: Mechanics,
+    over: Matrix4<f64>,
+    mean: Matrix4<f64>,
+    dt_s: f64,
+    rate: f64,
+}
+
+/// Steps that differ by less than this share of themselves are one.
+const ALIKE: f64 = 1e-7;
+
+impl Step {
+    fn new(mechanics: Mechanics, rate: f64, dt_s: f64, span_s: f64) -> Self {
+        let generator = mechanics.generator();
+        Self { over: (generator * dt_s).exp(), mean: stokes::mean(&generator, span_s), mechanics, dt_s, rate }
+    }
+
+    #[allow(clippy::float_cmp, reason = "the same rate, not one near it")]
+    fn serves(&self, dt_s: f64, rate: f64) -> bool {
+        self.rate == rate && (self.dt_s - dt_s).abs() <= ALIKE * dt_s
+    }
+}

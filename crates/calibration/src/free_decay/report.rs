@@ -1,0 +1,318 @@
+//! The report of free decays, in the form that all instruments share: what was found, how sure it is, what is left.
+
+use cvg_model::effects::{EffectId, Shown};
+
+use super::effects::effects;
+use super::errors::{Part, after, in_volts, raw};
+use super::fit::Fit;
+use super::identify::Head;
+use super::model::Term;
+use super::phase::Phase;
+use super::runs::DecayRun;
+use super::selection::Chosen;
+use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::picture::picture_of;
+use crate::diagnostics::residual::{
+    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
+};
+use crate::error::Refusal;
+use crate::identification::{BiasCurve, Figures, Identification};
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::recording::Instrument;
+use crate::report::calibration::{Calibration, Provenance};
+use crate::report::stages::stages;
+use crate::report::{
+    DecayReport, EffectReport, Estimate, Heldout, Report, ResidualReport, RunReport, SCHEMA, Status, StepReport, Tool,
+};
+
+/// Held-out errors at the three stages.
+#[derive(Debug, Clone)]
+pub(crate) struct Errors {
+    pub(crate) raw: Evaluation,
+    pub(crate) declared: Evaluation,
+    pub(crate) after: Evaluation,
+}
+
+impl Errors {
+    /// Stretches that the errors are counted on.
+    pub(crate) fn held_out(&self) -> usize {
+        self.after.errors().count()
+    }
+}
+
+/// What an identification of decays found.
+pub(crate) struct Finding {
+    pub(crate) chosen: Chosen,
+    /// what was chosen, fitted to all that may be fitted
+    pub(crate) fit: Fit,
+    /// the paper's terms alone, on the same
+    pub(crate) declared: Fit,
+    pub(crate) phase: Option<Phase>,
+    pub(crate) errors: Errors,
+}
+
+/// Points of one curve.
+const CURVE_POINTS: usize = 2000;
+/// Seconds of an hour, and degrees per hour of a rad/s.
+const SECONDS_PER_HOUR: f64 = 3600.0;
+
+/// Reports.
+///
+/// # Errors
+/// [`Refusal`] where a number is none.
+pub(crate) fn report(
+    head: Head,
+    finding: &Finding,
+    fitted: &[DecayRun],
+    held: &[DecayRun],
+    pictured: bool,
+) -> Result<Identification, Refusal> {
+    let Errors { raw: raw_errors, declared, after: found } = &finding.errors;
+    let on_fit = whole(fitted, &finding.fit);
+    let white =
+        ljung_box(&autocorrelation(&in_volts(&on_fit), WHITENESS_LAGS), on_fit.errors().count()) >= WHITENESS_LEVEL;
+    let effects = effects(finding, fitted);
+    let mut warnings = head.warnings.clone();
+    warnings.extend(remarks(finding, fitted, held, &head));
+    let gain = finding.fit.model.has(Term::AngularGain);
+    let hypothesis = hypothesis(finding, &head);
+    let mut steps = stages(Some(raw_errors), declared, found, &[]);
+    steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, finding)));
+    let names: Vec<String> = if held.is_empty() { fitted } else { held }.iter().map(|r| r.name.clone()).collect();
+    let picture = pictured.then(|| picture_of(&names, Some(raw_errors), declared, found, &hypothesis));
+    let report = Report {
+        schema: SCHEMA.into(),
+        status: Status::Answered,
+        reason: None,
+        tool: Tool::default(),
+        inputs: head.inputs.clone(),
+        device: head.device.clone(),
+        instrument: "gyroscope".into(),
+        angular_gain: if gain { estimate(&finding.fit, Term::AngularGain) } else { Estimate::unknown() },
+        detection_gain_ratio: finding.fit.model.has(Term::GainRatio).then(|| {
+            let e = estimate(&finding.fit, Term::GainRatio);
+            Estimate { value: 1.0 + e.value, ci95: e.ci95.map(|end| 1.0 + end) }
+        }),
+        actuation_gain_ratio: None,
+        effects,
+        heldout: Heldout {
+            raw: Some(raw_errors.size()),
+            declared: declared.size(),
+            discovered: found.size(),
+            noise_floor_deg: found.noise_floor().to_degrees(),
+        },
+        steps,
+        residual: ResidualReport { harmonics: reported_harmonics(found, Follows::Pattern, found), white },
+        channels: Vec::new(),
+        unexplained: Vec::new(),
+        runs: runs(&head, fitted, held, &on_fit, found),
+        decomposition: Vec::new(),
+        proposals: Vec::new(),
+        scale_factor: None,
+        allan: None,
+        decay: Some(decay(finding, fitted, &head)),
+        warnings,
+    };
+    if !report.heldout.discovered.rms_deg.is_finite() || !report.heldout.declared.rms_deg.is_finite() {
+        return Err(Refusal::no_answer(&head.device, "the angle error is no number", "decays with a pattern angle"));
+    }
+    let figures = Figures { bias: curves(&names, raw_errors, declared, found), ring_downs: Vec::new() };
+    let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: None };
+    let calibration = Calibration { device: head.device, hypothesis, provenance };
+    Ok(Identification { report, calibration, figures, steps: Vec::new(), picture })
+}
+
+pub(crate) fn estimate(fit: &Fit, term: Term) -> Estimate {
+    Estimate::new(fit.model.value(term), fit.deviation(term))
+}
+
+/// Errors of whole runs under a model that was fitted to them.
+pub(crate) fn whole(runs: &[DecayRun], fit: &Fit) -> Evaluation {
+    after(&parts(runs, fit), &fit.model, None)
+}
+
+/// Their angle, less its best line.
+pub(crate) fn whole_raw(runs: &[DecayRun], fit: &Fit) -> Evaluation {
+    raw(&parts(runs, fit), &whole(runs, fit))
+}
+
+fn parts<'a>(runs: &'a [DecayRun], fit: &'a Fit) -> Vec<Part<'a>> {
+    runs.iter().zip(&fit.starts).map(|(run, start)| Part { run, from: 0, start: Some(start) }).collect()
+}
+
+/// θ̇ of the input at the mean rate of the runs, deg/h.
+fn precession(fit: &Fit, runs: &[DecayRun]) -> Estimate {
+    let per_hour = SECONDS_PER_HOUR.to_degrees();
+    if fit.model.has(Term::Precession) {
+        let e = estimate(fit, Term::Precession);
+        return Estimate { value: per_hour * e.value, ci95: e.ci95.map(|end| per_hour * end) };
+    }
+    let rate = runs.iter().map(DecayRun::mean_rate).sum::<f64>() / runs.len().max(1) as f64;
+    let (k, deviation) = (fit.model.value(Term::AngularGain), fit.deviation(Term::AngularGain));
+    Estimate::new(-per_hour * k * rate, per_hour * deviation * rate.abs())
+}
+
+fn decay(finding: &Finding, runs: &[DecayRun], head: &Head) -> DecayReport {
+    let damping = estimate(&finding.fit, Term::Damping);
+    let ahead = finding.phase.as_ref().map(|p| p.ahead_rad_s.as_slice()).unwrap_or_default();
+    let frequencies = runs.iter().zip(ahead).filter_map(|(r, ahead)| {
+        let reference = head.references_hz.get(r.number).copied().flatten()?;
+        Some(reference + ahead / std::f64::consts::TAU)
+    });
+    let all: Vec<f64> = frequencies.collect();
+    let told = finding.phase.as_ref().filter(|p| p.gain > super::selection::BELIEVED);
+    DecayReport {
+        damping_per_s: damping,
+        tau_s: Estimate { value: 1.0 / damping.value, ci95: [1.0 / damping.ci95[1], 1.0 / damping.ci95[0]] },
+        precession_dph: precession(&finding.fit, runs),
+        precession_dph_declared: precession(&finding.declared, runs),
+        carrier_hz: (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64),
+        frequency_per_energy: told.map(|p| Estimate::new(p.per_energy.0, p.per_energy.1)),
+        many_angles: finding.chosen.many_angles,
+        rms_deg: [
+            whole_raw(runs, &finding.fit).size().rms_deg,
+            whole(runs, &finding.declared).size().rms_deg,
+            whole(runs, &finding.fit).size().rms_deg,
+        ],
+    }
+}
+
+/// What a reader must know.
+fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Head) -> Vec<String> {
+    let mut out = Vec::new();
+    if !finding.chosen.many_angles {
+        out.push(
+            "the pattern stands near one angle: what anisodamping adds to precession and to the decay cannot be told from \
+             them there, and of the split only what lies at 45° to the pattern shows; decays at several starting angles \
+             would tell"
+                .into(),
+        );
+    }
+    if finding.fit.model.has(Term::Precession) {
+        let known = fitted.iter().any(|r| r.rate_is_known);
+        let why = if known { "the input rate is zero" } else { "the input rate is not stated" };
+        out.push(format!("{why}: the angular gain is not told, and `decay` has the precession rate itself"));
+        if let Some(stated) = head.stated_gain {
+            out.push(format!("the stated angular gain of {stated} was not used"));
+        }
+    } else if let Some(run) = fitted.iter().find(|r| !r.rate_is_known) {
+        out.push(format!("{}: the input rate is not stated, and is taken as zero", run.name));
+    }
+    if !finding.fit.model.has(Term::GainRatio) {
+        out.push("the campaign cannot tell the detection gain ratio: the decays show no sign of unequal gains".into());
+    }
+    out.push("a free decay has no drive: there is no actuation gain ratio".into());
+    if held.is_empty() {
+        out.push(
+            "held-out errors are those of values fitted to the first three quarters of each decay; the values stated are \
+             fitted to all of it"
+                .into(),
+        );
+    }
+    let spikes: usize = finding.fit.set_aside.iter().flatten().filter(|a| **a).count();
+    if spikes > 0 {
+        out.push(format!("{spikes} stretches were set aside as spikes"));
+    }
+    for run in fitted.iter().chain(held).filter(|r| r.in_noise > 0) {
+        out.push(format!("{}: the last {} of {} rows were left out, near the noise", run.name, run.in_noise, run.rows));
+    }
+    out
+}
+
+fn hypothesis(finding: &Finding, head: &Head) -> Hypothesis {
+    let model = &finding.fit.model;
+    let gain =
+        if model.has(Term::AngularGain) { model.value(Term::AngularGain) } else { head.stated_gain.unwrap_or(1.0) };
+    let mut h = Hypothesis::ideal(Instrument::Gyroscope, std::f64::consts::PI, gain);
+    h.damping_per_s = model.value(Term::Damping);
+    let m = model.mechanics(0.0);
+    let mut add = |id: EffectId, values, origin| h.members.push(Member { id, values, origin, refined: true });
+    if finding.chosen.many_angles {
+        let [c, s] = m.anisodamping;
+        add(EffectId::Anisodamping, [c, s, 0.0, 0.0], Origin::Declared);
+    }
+    if model.has(Term::SplitAlong) {
+        let [c, s] = m.anisoelasticity;
+        add(EffectId::Anisoelasticity, [c, s, 0.0, 0.0], Origin::Declared);
+    }
+    if model.has(Term::Skew) {
+        add(EffectId::DetectionSkew, [model.value(Term::Skew), 0.0, 0.0, 0.0], Origin::Discovered);
+    }
+    if model.has(Term::GainRatio) {
+        let g = 1.0 + model.value(Term::GainRatio);
+        add(EffectId::DetectionGainMismatch, [g, 0.0, 0.0, 0.0], Origin::Declared);
+    }
+    h.members.sort_by_key(|m| m.id);
+    h
+}
+
+fn step(e: &EffectReport, finding: &Finding) -> StepReport {
+    let added = finding.chosen.added.iter().find(|a| super::effects::name(a.term) == e.id);
+    StepReport {
+        stage: if e.origin == Origin::Discovered { "discovered".into() } else { "empirical".into() },
+        effect: Some(e.id.clone()),
+        heldout: finding.errors.after.size(),
+        harmonics: reported_harmonics(&finding.errors.after, Follows::Pattern, &finding.errors.after),
+        signature: None,
+        gain: added.map(|a| a.gain),
+        rivals: added.map(super::effects::rivals).unwrap_or_default(),
+        energy_balance: None,
+        doubt: None,
+    }
+}
+
+fn runs(
+    head: &Head,
+    fitted: &[DecayRun],
+    held: &[DecayRun],
+    on_fit: &Evaluation,
+    found: &Evaluation,
+) -> Vec<RunReport> {
+    let mut out = head.runs.clone();
+    let quarter = if held.is_empty() { "fit, last quarter held out" } else { "fit" };
+    let of_held = if held.is_empty() { None } else { Some(found) };
+    let all = fitted
+        .iter()
+        .map(|r| (r, on_fit, quarter))
+        .chain(held.iter().filter_map(|r| of_held.map(|e| (r, e, "holdout"))));
+    for (run, errors, part) in all {
+        let Some(r) = out.get_mut(run.number) else { continue };
+        r.r#use = part.into();
+        r.rate_dps = run.rate_is_known.then(|| run.mean_rate().to_degrees());
+        let own = errors.segments.iter().zip(&errors.kept).find(|(s, _)| s.track == run.number);
+        if let Some((s, kept)) = own {
+            let own = Evaluation { segments: vec![s.clone()], kept: vec![kept.clone()] };
+            r.rms_deg = Some(own.size().rms_deg);
+            r.spikes = kept.iter().filter(|k| !**k).count();
+        }
+    }
+    out
+}
+
+fn curves(names: &[String], raw: &Evaluation, declared: &Evaluation, found: &Evaluation) -> Vec<BiasCurve> {
+    found
+        .segments
+        .iter()
+        .enumerate()
+        .map(|(at, s)| {
+            let stride = (s.angle.len() / CURVE_POINTS).max(1);
+            let shown: Vec<usize> = (0..s.angle.len()).step_by(stride).filter(|&i| found.kept[at][i]).collect();
+            let of = |e: &Evaluation| shown.iter().map(|&i| e.segments[at].angle[i].to_degrees()).collect();
+            BiasCurve {
+                name: names.get(at).cloned().unwrap_or_default(),
+                pattern_deg: shown.iter().map(|&i| s.direction[i].to_degrees().rem_euclid(180.0)).collect(),
+                raw_deg: of(raw),
+                declared_deg: of(declared),
+                discovered_deg: of(found),
+            }
+        })
+        .collect()
+}
+
+/// How the library shows the parameters of an effect.
+pub(crate) fn shown(id: EffectId) -> Option<(&'static str, &'static str, &'static str, f64)> {
+    match id.description().shown {
+        [Shown::Polar { magnitude, unit, angle, division, .. }] => Some((magnitude, unit, angle, *division)),
+        _ => None,
+    }
+}

@@ -1,0 +1,182 @@
+//! The orbit in variables that its phase does not enter: (E, R, S, Q), which obey linear equations whatever the orbit's
+//! shape. A pattern angle has no meaning where the orbit is a circle; these have one everywhere, and white noise of the
+//! envelope leaves the means of R, S and Q where they are, however small the vibration has become.
+//!
+//! Every coefficient is asked of the model: nothing of the mechanics is written down here a second time.
+
+use cvg_model::effects::{EffectId, Moment};
+use cvg_model::resonator::{Anisotropy, Resonator};
+use cvg_model::{Envelope, Pendulum};
+use nalgebra::{Matrix4, Vector4};
+
+/// (E, R, S, Q), V².
+pub(crate) type State = Vector4<f64>;
+
+/// What a decay's mechanics are at one input rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mechanics {
+    /// 1/τ, 1/s
+    pub(crate) damping_per_s: f64,
+    /// Δ(1/τ) along X–Y, 1/s
+    pub(crate) anisodamping: [f64; 2],
+    /// Δω along X–Y, rad/s
+    pub(crate) anisoelasticity: [f64; 2],
+    /// θ̇ of the input rotation, rad/s
+    pub(crate) precession_rad_s: f64,
+    /// θ̇ = cQ of an isotropic nonlinear spring, rad/s/V²
+    pub(crate) spring: f64,
+    /// ȧ = −γa³ beside the linear damping, 1/s/V²
+    pub(crate) damping_growth: f64,
+}
+
+/// The variables of a pendulum as a vector.
+fn state(p: &Pendulum<f64>) -> State {
+    Vector4::new(p.e, p.r, p.s, p.q)
+}
+
+/// (E, R, S, Q) of an envelope.
+pub(crate) fn of(e: &Envelope<f64>) -> State {
+    state(&e.pendulum())
+}
+
+/// Four vibrations from whose (E, R, S, Q) every linear map of them is known: along x, along y, between them, a circle.
+const PROBES: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+    [std::f64::consts::FRAC_1_SQRT_2, 0.0, std::f64::consts::FRAC_1_SQRT_2, 0.0],
+    [std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2],
+];
+
+/// The matrix of a linear map from what it makes of the probes, whose states are (1, ±1, 0, 0), (1, 0, 1, 0), (1, 0, 0, 1).
+fn matrix(map: impl Fn(&Envelope<f64>) -> State) -> Matrix4<f64> {
+    let [x, y, between, circle] = PROBES.map(|[x_c, x_s, y_c, y_s]| map(&Envelope::new(x_c, x_s, y_c, y_s)));
+    let e = (x + y) * 0.5;
+    Matrix4::from_columns(&[e, (x - y) * 0.5, between - e, circle - e])
+}
+
+impl Mechanics {
+    fn resonator(&self) -> Resonator<f64> {
+        let along = |[cos2, sin2]: [f64; 2]| Anisotropy { cos2, sin2 };
+        Resonator {
+            omega_rad_s: 0.0,
+            angular_gain: 1.0,
+            centrifugal_gain: 0.0,
+            damping_per_s: self.damping_per_s,
+            anisodamping: along(self.anisodamping),
+            anisoelasticity: along(self.anisoelasticity),
+        }
+    }
+
+    /// d/dt (E, R, S, Q) of the linear mechanics, from the envelope's equation of motion.
+    pub(crate) fn generator(&self) -> Matrix4<f64> {
+        let resonator = self.resonator();
+        matrix(|e| state(&e.pendulum_rate(&resonator.envelope_rate(e, -self.precession_rad_s, 0.0))))
+    }
+
+    /// d/dt (x_c, x_s, y_c, y_s), for the phase, which (E, R, S, Q) do not have.
+    pub(crate) fn envelope_generator(&self) -> Matrix4<f64> {
+        let resonator = self.resonator();
+        let column = |unit: Vector4<f64>| {
+            let e = Envelope::new(unit[0], unit[1], unit[2], unit[3]);
+            let rate = resonator.envelope_rate(&e, -self.precession_rad_s, 0.0);
+            Vector4::new(rate.x_c, rate.x_s, rate.y_c, rate.y_s)
+        };
+        let unit = |i: usize| column(Vector4::ith(i, 1.0));
+        Matrix4::from_columns(&[unit(0), unit(1), unit(2), unit(3)])
+    }
+
+    /// The nonlinear part alone over `dt_s`, exactly: precession by cQ holds E and Q, damping by γE holds the orbit's shape.
+    pub(crate) fn nonlinear(&self, u: &State, dt_s: f64) -> State {
+        let mut out = *u;
+        if self.spring != 0.0 {
+            let (sin, cos) = (2.0 * self.spring * u[3] * dt_s).sin_cos();
+            (out[1], out[2]) = (u[1] * cos - u[2] * sin, u[2] * cos + u[1] * sin);
+        }
+        if self.damping_growth != 0.0 {
+            out /= (1.0 + 2.0 * self.damping_growth * u[0] * dt_s).max(f64::MIN_POSITIVE);
+        }
+        out
+    }
+}
+
+/// What unequal gains and an oblique axis make of (E, R, S, Q).
+pub(crate) fn readout(gain_ratio: f64, skew: f64) -> Matrix4<f64> {
+    let now = Moment::default();
+    matrix(|e| {
+        let skewed = EffectId::DetectionSkew.read(&[skew, 0.0, 0.0, 0.0], *e, &now);
+        of(&EffectId::DetectionGainMismatch.read(&[gain_ratio, 0.0, 0.0, 0.0], skewed, &now))
+    })
+}
+
+/// Terms of the series of a mean; the first that is left out is 1/3.6e6 of (‖B‖T)¹⁰/2¹⁰.
+const MEAN_TERMS: u32 = 5;
+
+/// The mean over `span_s` about an instant, of what is known at the instant: sinh(BT/2)/(BT/2).
+pub(crate) fn mean(generator: &Matrix4<f64>, span_s: f64) -> Matrix4<f64> {
+    let half = generator * (0.5 * span_s);
+    let square = half * half;
+    let (mut sum, mut term) = (Matrix4::identity(), Matrix4::identity());
+    for k in 1..MEAN_TERMS {
+        let k = f64::from(k);
+        term = term * square / (2.0 * k * (2.0 * k + 1.0));
+        sum += term;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cvg_model::resonator::averaged::Averages;
+
+    const M: Mechanics = Mechanics {
+        damping_per_s: 0.05,
+        anisodamping: [0.011, -0.007],
+        anisoelasticity: [0.31, 0.17],
+        precession_rad_s: 0.4,
+        spring: 0.03,
+        damping_growth: 0.02,
+    };
+
+    #[test]
+    fn the_linear_equations_are_lynchs_averages() {
+        let resonator = M.resonator();
+        for (e, q, theta) in [(1.0, 0.1, 0.3), (2.0, -1.1, 1.2), (0.4, 0.0, -0.7)] {
+            let averages = Averages { e, q, theta };
+            let rate = resonator.averaged_rate(&averages, -M.precession_rad_s);
+            let line = f64::sqrt(e * e - q * q);
+            let u = State::new(e, line * (2.0 * theta).cos(), line * (2.0 * theta).sin(), q);
+            let d = M.generator() * u;
+            let turn = (u[1] * d[2] - u[2] * d[1]) / (2.0 * line * line);
+            assert!((d[0] - rate.e).abs() < 1e-12 && (d[3] - rate.q).abs() < 1e-12, "{d} {rate:?}");
+            assert!((turn - rate.theta).abs() < 1e-12, "{turn} {}", rate.theta);
+        }
+    }
+
+    #[test]
+    fn the_nonlinear_part_precesses_with_quadrature_and_decays_with_energy() {
+        let u = State::new(2.0, 1.2, 0.5, (4.0 - 1.44 - 0.25f64).sqrt());
+        let dt = 1e-6;
+        let d = (M.nonlinear(&u, dt) - u) / dt;
+        let theta_dot = (u[1] * d[2] - u[2] * d[1]) / (2.0 * (u[1] * u[1] + u[2] * u[2]));
+        assert!((theta_dot - M.spring * u[3]).abs() < 1e-6, "{theta_dot}");
+        assert!((d[0] + 2.0 * M.damping_growth * u[0] * u[0]).abs() < 1e-5, "{}", d[0]);
+    }
+
+    #[test]
+    fn a_mean_over_a_span_is_that_of_many_instants() {
+        let (b, u) = (M.generator(), State::new(1.0, 0.6, 0.0, 0.8));
+        let span = 2.0;
+        let n = 2000;
+        let at = |i: i32| (b * (span * (f64::from(i) + 0.5) / f64::from(n) - 0.5 * span)).exp() * u;
+        let slow = (0..n).map(at).sum::<State>() / f64::from(n);
+        assert!((mean(&b, span) * u - slow).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_readout_acts_on_states_as_on_envelopes() {
+        let e = Envelope::new(0.3, -0.2, 0.7, 0.4);
+        let read = Envelope::new(0.3, -0.2, 1.02 * (0.7 + 0.05 * 0.3), 1.02 * (0.4 - 0.05 * 0.2));
+        assert!((readout(1.02, 0.05) * of(&e) - of(&read)).norm() < 1e-12);
+    }
+}

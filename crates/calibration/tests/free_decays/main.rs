@@ -1,0 +1,177 @@
+//! Decays without any loop, at several starting angles: what they tell of a resonator, and how sure of it they are.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test fails by panicking")]
+
+mod foucault;
+mod ring;
+
+use cvg_calibration::recording::Campaign;
+use cvg_calibration::report::{Estimate, Report};
+use cvg_calibration::{Options, Origin, identify};
+use foucault::Pendulum;
+use rayon::prelude::*;
+use ring::Ring;
+
+const ANGLES: [f64; 8] = [0.0, 22.5, 45.0, 67.5, 90.0, 112.5, 135.0, 157.5];
+
+fn identified(ring: &Ring, angles: &[f64], of_each: &str, seed: u64) -> Report {
+    let folder = tempfile::tempdir().unwrap();
+    let path = ring.campaign(folder.path(), angles, of_each, seed);
+    identify(Campaign::open(&path).unwrap(), &Options::default()).unwrap().report
+}
+
+fn parameter(report: &Report, effect: &str, name: &str) -> Estimate {
+    let effect = report.effects.iter().find(|e| e.id == effect).expect("the effect is there");
+    let p = effect.parameters.iter().find(|p| p.name == name).expect("the parameter is there");
+    Estimate { value: p.value, ci95: p.ci95.expect("an interval") }
+}
+
+fn is_within(truth: f64, e: &Estimate) -> bool {
+    (e.ci95[0]..=e.ci95[1]).contains(&truth)
+}
+
+fn discovered(report: &Report) -> Vec<&str> {
+    report.effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| e.id.as_str()).collect()
+}
+
+/// What a usual ring is, with what was found of it.
+fn truths(report: &Report) -> [(f64, Estimate); 6] {
+    [
+        (1.0 / 22.0, report.decay.as_ref().unwrap().damping_per_s),
+        (0.78, report.angular_gain),
+        (4.7e-3, parameter(report, "anisodamping", "anisodamping")),
+        (0.4f64.to_degrees(), parameter(report, "anisodamping", "theta_tau")),
+        (SPLIT, parameter(report, "anisoelasticity", "anisoelasticity")),
+        ((-0.7f64).to_degrees(), parameter(report, "anisoelasticity", "theta_omega")),
+    ]
+}
+
+const SPLIT: f64 = std::f64::consts::TAU * 0.04;
+
+#[test]
+fn decays_at_eight_angles_tell_the_split_to_a_thousandth() {
+    let report = identified(&Ring::usual(), &ANGLES, "rate_dps = 10.0", 1);
+    let split = parameter(&report, "anisoelasticity", "anisoelasticity");
+    assert!((split.value / SPLIT - 1.0).abs() < 1e-3, "{split:?}");
+    for (truth, e) in truths(&report) {
+        assert!((e.value - truth).abs() < 2.0 * e.half_width(), "{truth}: {e:?}");
+    }
+    assert!(report.residual.white);
+    assert!(report.heldout.declared.rms_deg < 0.1 * report.heldout.raw.unwrap().rms_deg);
+    assert_eq!(discovered(&report), [""; 0]);
+}
+
+/// How many of the truths lie within their intervals in so many campaigns, one count a parameter, and how many discoveries
+/// were made of what is not there.
+fn covered(ring: &Ring, campaigns: u64) -> ([u64; 6], usize) {
+    let reports: Vec<Report> =
+        (0..campaigns).into_par_iter().map(|seed| identified(ring, &ANGLES, "rate_dps = 10.0", 100 + seed)).collect();
+    let mut counts = [0; 6];
+    for report in &reports {
+        for (count, (truth, e)) in counts.iter_mut().zip(truths(report)) {
+            *count += u64::from(is_within(truth, &e));
+        }
+    }
+    (counts, reports.iter().map(|r| discovered(r).len()).sum())
+}
+
+#[test]
+fn intervals_of_a_hundred_campaigns_hold_what_they_say() {
+    let ring = Ring { rows: 400, row_s: 0.1, ..Ring::usual() };
+    let (counts, false_discoveries) = covered(&ring, 120);
+    println!("{counts:?} of 120 each");
+    // three binomial deviations of 120 at 95 %, and of six times as many
+    assert!(counts.iter().all(|c| *c >= 107), "{counts:?}");
+    let all: u64 = counts.iter().sum();
+    assert!((667..=701).contains(&all), "{all} of 720");
+    assert_eq!(false_discoveries, 0);
+}
+
+#[test]
+fn intervals_hold_where_noise_remembers() {
+    let ring = Ring { rows: 400, row_s: 0.1, memory: 0.7, ..Ring::usual() };
+    let (counts, false_discoveries) = covered(&ring, 60);
+    println!("{counts:?} of 60 each");
+    let all: u64 = counts.iter().sum();
+    assert!((322..=358).contains(&all), "{all} of 360");
+    assert_eq!(false_discoveries, 0);
+}
+
+#[test]
+fn a_spring_that_precesses_with_quadrature_is_found_and_named() {
+    let ring = Ring { spring: 0.01, frequency_per_energy: -0.03, ..Ring::usual() };
+    let report = identified(&ring, &ANGLES, "rate_dps = 10.0", 3);
+    assert_eq!(discovered(&report), ["spring-isotropic"]);
+    let c = parameter(&report, "spring-isotropic", "c");
+    assert!((c.value - 0.01).abs() < 2.0 * c.half_width(), "{c:?}");
+    let per_energy = parameter(&report, "spring-isotropic", "frequency_per_energy");
+    assert!((per_energy.value + 0.03).abs() < 2.0 * per_energy.half_width(), "{per_energy:?}");
+}
+
+#[test]
+fn unequal_gains_of_the_readout_are_told_from_anisodamping() {
+    let ring = Ring { gain_ratio: 1.0132, ..Ring::usual() };
+    let report = identified(&ring, &ANGLES, "rate_dps = 10.0", 4);
+    let ratio = report.detection_gain_ratio.expect("the gain ratio is told");
+    assert!((ratio.value - 1.0132).abs() < 2.0 * ratio.half_width(), "{ratio:?}");
+    for (truth, e) in truths(&report) {
+        assert!((e.value - truth).abs() < 2.0 * e.half_width(), "{truth}: {e:?}");
+    }
+}
+
+#[test]
+fn without_a_stated_rate_precession_is_told_and_the_angular_gain_is_not() {
+    let report = identified(&Ring::usual(), &ANGLES, "", 5);
+    assert!(!report.angular_gain.is_told());
+    let written = serde_json::to_value(&report).unwrap();
+    assert!(written["angular_gain"].is_null());
+    let precession = report.decay.unwrap().precession_dph;
+    let truth = -0.78 * 10.0 * 3600.0;
+    assert!((precession.value - truth).abs() < 2.0 * precession.half_width(), "{precession:?}");
+}
+
+#[test]
+fn a_decay_near_one_angle_leaves_anisodamping_unsaid() {
+    let mut ring = Ring { rate_dps: 0.0, noise_v: 1e-4, ..Ring::usual() };
+    ring.resonator.anisoelasticity = cvg_model::resonator::Anisotropy::new(1e-3, 0.7);
+    let report = identified(&ring, &[10.0], "", 6);
+    assert!(report.effects.iter().all(|e| e.id != "anisodamping"));
+    assert!(report.warnings.iter().any(|w| w.contains("near one angle")), "{:?}", report.warnings);
+}
+
+fn filmed(pendulum: &Pendulum, seed: u64) -> Report {
+    let folder = tempfile::tempdir().unwrap();
+    let path = pendulum.filmed(folder.path(), seed);
+    identify(Campaign::open(&path).unwrap(), &Options::default()).unwrap().report
+}
+
+#[test]
+fn airys_precession_is_found_in_the_film_of_a_pendulum_and_the_rate_put_right() {
+    let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3 };
+    for seed in 1..=6 {
+        let report = filmed(&pendulum, seed);
+        let decay = report.decay.as_ref().unwrap();
+        assert_eq!(discovered(&report), ["spring-isotropic"]);
+        let c = parameter(&report, "spring-isotropic", "c");
+        let l = Pendulum::length_m() * foucault::PIXELS_PER_M;
+        let airy = 3.0 / 16.0 * std::f64::consts::TAU * foucault::HZ / (l * l);
+        assert!((c.value - airy).abs() < 2.0 * c.half_width() && c.half_width() < 0.05 * airy, "{airy}: {c:?}");
+        let (rate, without) = (decay.precession_dph, decay.precession_dph_declared);
+        assert!((rate.value + foucault::RATE_DPH).abs() < 2.0 * rate.half_width(), "{rate:?}");
+        assert!((without.value + foucault::RATE_DPH).abs() > 3.0, "{without:?}");
+        assert!((report.angular_gain.value - 1.0).abs() < 0.03, "{:?}", report.angular_gain);
+        let [constant, _, after] = decay.rms_deg;
+        println!("{constant:.4} {after:.4} {rate:?} {without:?}");
+        assert!(after < 0.2 * constant, "{constant} {after}");
+    }
+}
+
+#[test]
+fn a_bowl_without_airys_precession_is_not_said_to_have_it() {
+    let bowl = Pendulum { spherical: false, split_rad_s: 2.5e-5, noise_px: 0.3 };
+    for seed in 1..=12 {
+        let report = filmed(&bowl, seed);
+        assert_eq!(discovered(&report), [""; 0], "{:?}", report.effects);
+        let rate = report.decay.unwrap().precession_dph;
+        assert!((rate.value + foucault::RATE_DPH).abs() < 2.0 * rate.half_width(), "{rate:?}");
+    }
+}
