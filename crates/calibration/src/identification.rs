@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use crate::angle_sensor;
 use crate::carrier;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::diagnostics::picture::{Picture, Scene};
+use crate::diagnostics::plots::{PlotContext, PlotData};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
@@ -14,7 +14,7 @@ use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::identifiability::{confounded_with, separated_by};
-use crate::estimation::joint_fit::{Bench, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::estimation::joint_fit::{Dataset, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::free_decay;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
@@ -60,7 +60,7 @@ pub struct Identification {
     /// the steps of discovery
     pub steps: Vec<Step>,
     /// what a person wants to see besides, where it was asked for
-    pub picture: Option<Picture>,
+    pub plots: Option<PlotData>,
 }
 
 /// Curves for a report, thinned to what a figure can show.
@@ -90,7 +90,7 @@ pub struct BiasCurve {
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
 /// Share of its prior's width to which an unknown must narrow to count as told by the data.
-const TOLD: f64 = 0.1;
+const MIN_CONTRACTION: f64 = 0.1;
 /// Gain ratios known no better than this, as the half width of the interval, are no answer.
 const WIDEST_DETECTION_RATIO: f64 = 0.1;
 const WIDEST_ACTUATION_RATIO: f64 = 0.02;
@@ -107,17 +107,17 @@ pub fn identify(campaign: Campaign, options: &Options<'_>) -> Result<Identificat
 ///
 /// # Errors
 /// As [`identify`].
-pub fn identify_with_picture(campaign: Campaign, options: &Options<'_>) -> Result<Identification, Refusal> {
+pub fn identify_with_plots(campaign: Campaign, options: &Options<'_>) -> Result<Identification, Refusal> {
     run(campaign, options, true)
 }
 
-fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+fn run(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
-        return free_decay::identify(campaign, options, pictured);
+        return free_decay::identify(campaign, options, with_plots);
     }
     let (campaign, decays) = free_decay::apart(campaign);
-    let mut identified = looped(campaign, options, pictured)?;
+    let mut identified = looped(campaign, options, with_plots)?;
     if let Some(decays) = decays {
         free_decay::beside(&mut identified, decays, options);
     }
@@ -125,48 +125,48 @@ fn run(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Iden
 }
 
 /// An instrument whose loops are closed, or that has none.
-fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
-        return angle_sensor::identify(campaign, options, pictured);
+        return angle_sensor::identify(campaign, options, with_plots);
     }
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
     let inputs = provenance::sums(&provenance::files(&campaign));
     let amplitude_v = provenance::amplitudes(&campaign);
     (options.progress)("preparing the runs");
-    let mut bench = Bench::new(campaign)?;
+    let mut dataset = Dataset::new(campaign)?;
     (options.progress)("fitting the declared model");
-    let paper = declared_hypothesis(&bench.start);
-    let declared = fit_with_ring_downs(&mut bench, &paper)?;
+    let paper = declared_hypothesis(&dataset.start);
+    let declared = fit_with_ring_downs(&mut dataset, &paper)?;
     let declared_fit = declared.fit.clone();
     let (mut fitted, mut steps) =
-        if options.discover { discover(&mut bench, declared, options.progress)? } else { (declared, Vec::new()) };
+        if options.discover { discover(&mut dataset, declared, options.progress)? } else { (declared, Vec::new()) };
     (options.progress)("weighing by what the noise remembers");
-    let covariance = last_step(&mut bench, &mut fitted, &mut steps)?;
-    let scale_factor = scale_factor(&gains(&mut bench, &fitted));
+    let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    let scale_factor = scale_factor(&gains(&mut dataset, &fitted));
     (options.progress)("measuring the held-out error");
     let heldout = |h: &Hypothesis, fit: &Fit, like: Option<&Evaluation>| {
-        evaluate(&bench.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
+        evaluate(&dataset.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
     };
     let after = heldout(&fitted.fit.hypothesis, &fitted.fit, None);
     let before = heldout(&declared_fit.hypothesis, &declared_fit, Some(&after));
     let ideal = Hypothesis { members: Vec::new(), force_scale: 0.0, ..fitted.fit.hypothesis.clone() };
     let raw = heldout(&ideal, &fitted.fit, Some(&after));
 
-    let on_fit = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
-    let dense = |role| evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, role, Window::Dense, None);
+    let on_fit = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+    let dense = |role| evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, role, Window::Dense, None);
     let noise_floor = dense(Role::Holdout).noise_floor();
     let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
     let count = on_fit.errors().count();
     let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
 
     let declared_on_fit =
-        evaluate(&bench.tracks, &declared_fit.hypothesis, &declared_fit.starts, Role::Fit, Window::Whole, None);
-    let mut left = channels(&bench, &declared_fit, "declared", &declared_on_fit);
-    left.extend(channels(&bench, &fitted.fit, "discovered", &on_fit));
-    let mut warnings = std::mem::take(&mut bench.warnings);
-    let knowledge = Knowledge { bench: &bench, fitted: &fitted, covariance: &covariance };
+        evaluate(&dataset.tracks, &declared_fit.hypothesis, &declared_fit.starts, Role::Fit, Window::Whole, None);
+    let mut left = channels(&dataset, &declared_fit, "declared", &declared_on_fit);
+    left.extend(channels(&dataset, &fitted.fit, "discovered", &on_fit));
+    let mut warnings = std::mem::take(&mut dataset.warnings);
+    let knowledge = Knowledge { dataset: &dataset, fitted: &fitted, covariance: &covariance };
     let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
     let actuation_gain_ratio = knowledge.actuation_ratio(&mut warnings);
     let effects = knowledge.effects(&steps, &after);
@@ -178,11 +178,11 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
             e.separated_by.as_deref().unwrap_or("another run")
         ));
     }
-    let picture = pictured.then(|| {
+    let plots = with_plots.then(|| {
         let members = &fitted.fit.hypothesis.members;
-        let told: Vec<usize> = (0..members.len()).filter(|&at| knowledge.told(at, &members[at])).collect();
-        let scene = Scene {
-            bench: &bench,
+        let told: Vec<usize> = (0..members.len()).filter(|&at| knowledge.identifiable(at, &members[at])).collect();
+        let scene = PlotContext {
+            dataset: &dataset,
             fit: &fitted.fit,
             covariance: &covariance,
             raw: Some(&raw),
@@ -191,7 +191,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
             on_fit: &on_fit,
             members: &told,
         };
-        scene.picture()
+        scene.plots()
     });
     let spikes: Vec<usize> =
         fitted.fit.set_aside.iter().enumerate().map(|(track, fit)| fit + after.spikes_of(track)).collect();
@@ -199,8 +199,8 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
     if all_spikes > 0 {
         warnings.push(format!("{all_spikes} samples were set aside as spikes"));
     }
-    warnings.extend(tell_apart(&mut runs, &bench, &fitted.fit, (&on_fit, &after)));
-    for ((run, t), spikes) in bench.screen.of(&mut runs).into_iter().zip(&bench.tracks).zip(spikes) {
+    warnings.extend(tell_apart(&mut runs, &dataset, &fitted.fit, (&on_fit, &after)));
+    for ((run, t), spikes) in dataset.screen.of(&mut runs).into_iter().zip(&dataset.tracks).zip(spikes) {
         run.spikes = spikes;
         run.rate_dps = Some(t.track.mean_rate().to_degrees());
         run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
@@ -212,12 +212,12 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
     for (run, r) in runs.iter_mut().filter(|r| r.kind == "ringdown").zip(&fitted.ring_downs) {
         run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
     }
-    let mut unexplained = unexplained(&bench, &on_fit, &dense(Role::Fit), &after, noise_floor);
+    let mut unexplained = unexplained(&dataset, &on_fit, &dense(Role::Fit), &after, noise_floor);
     unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
     let facts = Facts {
-        instrument: bench.instrument,
-        period_deg: bench.start.period_rad.to_degrees(),
-        stated: bench.screen.stated(),
+        instrument: dataset.instrument,
+        period_deg: dataset.start.period_rad.to_degrees(),
+        stated: dataset.screen.stated(),
         held_out: after.errors().count(),
         fitted_rms_deg: on_fit.mean_square().sqrt().to_degrees(),
     };
@@ -228,7 +228,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
         tool: Tool::default(),
         inputs,
         device: device.clone(),
-        instrument: match bench.instrument {
+        instrument: match dataset.instrument {
             Instrument::Gyroscope => "gyroscope".into(),
             Instrument::Sensor => "sensor".into(),
         },
@@ -270,10 +270,10 @@ fn looped(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<I
     }
     Ok(Identification {
         report,
-        figures: figures(&bench, Some(&raw), &before, &after, fitted.ring_downs),
+        figures: figures(&dataset, Some(&raw), &before, &after, fitted.ring_downs),
         calibration,
         steps,
-        picture,
+        plots,
     })
 }
 
@@ -348,7 +348,7 @@ fn dropped(d: &crate::recording::Dropped) -> Vec<String> {
 }
 
 fn figures(
-    bench: &Bench,
+    dataset: &Dataset,
     raw: Option<&Evaluation>,
     before: &Evaluation,
     after: &Evaluation,
@@ -362,9 +362,9 @@ fn figures(
             let segment = &after.segments[s];
             let stride = (segment.angle.len() / CURVE_POINTS).max(1);
             let kept: Vec<usize> = (0..segment.angle.len()).step_by(stride).filter(|&i| after.kept[s][i]).collect();
-            let period = bench.start.period_rad;
+            let period = dataset.start.period_rad;
             BiasCurve {
-                name: bench.tracks[segment.track].track.name.clone(),
+                name: dataset.tracks[segment.track].track.name.clone(),
                 pattern_deg: kept.iter().map(|&i| segment.direction[i].rem_euclid(period).to_degrees()).collect(),
                 raw_deg: raw.map(|r| degrees(r, s, &kept)).unwrap_or_default(),
                 declared_deg: degrees(before, s, &kept),
@@ -377,7 +377,7 @@ fn figures(
 
 /// What a fit knows, with how sure it is.
 struct Knowledge<'a> {
-    bench: &'a Bench,
+    dataset: &'a Dataset,
     fitted: &'a Fitted,
     covariance: &'a DMatrix<f64>,
 }
@@ -403,7 +403,7 @@ impl Knowledge<'_> {
     /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for.
     fn angular_gain(&self) -> Estimate {
         let estimate = self.estimate(Unknown::AngularGain);
-        let slowest = self.bench.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
+        let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
         let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
         let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
         let slowed: f64 = causeless
@@ -429,13 +429,13 @@ impl Knowledge<'_> {
     }
 
     fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
-        if self.bench.instrument == Instrument::Sensor {
+        if self.dataset.instrument == Instrument::Sensor {
             warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
             return None;
         }
         let unknown = self.first(EffectId::ActuationGainMismatch);
         let told = unknown
-            .filter(|u| self.deviation(*u) < TOLD * belief::ACTUATION_RATIO)
+            .filter(|u| self.deviation(*u) < MIN_CONTRACTION * belief::ACTUATION_RATIO)
             .map(|u| self.estimate(u))
             .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
             .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
@@ -462,7 +462,7 @@ impl Knowledge<'_> {
     }
 
     /// A member's deviations are well below what was believed without data.
-    fn told(&self, at: usize, member: &Member) -> bool {
+    fn identifiable(&self, at: usize, member: &Member) -> bool {
         let scale = match member.id {
             EffectId::Anisodamping => belief::ANISODAMPING_PER_S,
             EffectId::Anisoelasticity => belief::ANISOELASTICITY_RAD_S,
@@ -473,18 +473,18 @@ impl Knowledge<'_> {
             .map(|p| Unknown::Effect(at, p))
             .filter(|u| self.index(*u).is_some())
             .collect::<Vec<_>>();
-        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < TOLD * scale)
+        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < MIN_CONTRACTION * scale)
     }
 
     fn effects(&self, steps: &[Step], after: &Evaluation) -> Vec<EffectReport> {
         let with = after.size().rms_deg;
         let mut steps: Vec<&Step> = steps.iter().collect();
-        let alike = self.bench.alike();
+        let alike = self.dataset.alike();
         self.hypothesis()
             .members
             .iter()
             .enumerate()
-            .filter(|(at, m)| self.told(*at, m))
+            .filter(|(at, m)| self.identifiable(*at, m))
             .map(|(at, m)| {
                 let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
                 let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
@@ -498,7 +498,7 @@ impl Knowledge<'_> {
                 let before = step.map_or_else(
                     || {
                         let e = evaluate(
-                            &self.bench.tracks,
+                            &self.dataset.tracks,
                             &without,
                             &self.fitted.fit.starts,
                             Role::Holdout,
@@ -588,9 +588,10 @@ fn evidence(member: &Member, step: Option<&Step>) -> String {
     let balance = step.energy_balance.map_or_else(String::new, |[before, after]| {
         format!("; the energy balance leaves {:.1} ppm of the amplitude instead of {:.1}", 1e6 * after, 1e6 * before)
     });
-    let doubt = step.doubt.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
+    let inconsistency =
+        step.inconsistency.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
     format!(
-        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{doubt}",
+        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
         d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
     )
 }

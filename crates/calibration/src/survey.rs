@@ -5,7 +5,7 @@ use crate::angle_sensor::likeness;
 use crate::angle_sensor::reference_free::{self, Curve};
 use crate::diagnostics::at_rest;
 use crate::error::Refusal;
-use crate::identification::{Identification, Options, identify_with_picture, run_report};
+use crate::identification::{Identification, Options, identify_with_plots, run_report};
 use crate::recording::{Campaign, Instrument, Run};
 use crate::report::calibration::Calibration;
 use crate::report::survey::Survey;
@@ -52,7 +52,7 @@ pub fn answer(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, R
     if surveyed {
         return survey(campaign, rest, provenance::sums(&files), options);
     }
-    let mut identified = identify_with_picture(campaign, options).map_err(|mut refusal| {
+    let mut identified = identify_with_plots(campaign, options).map_err(|mut refusal| {
         if let Some(hint) = hint {
             refusal.wanted = format!("{}; {hint}", refusal.wanted);
         }

@@ -142,7 +142,7 @@ pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Id
     let progress = Progress::begin();
     progress.say("reading");
     let options = Options { discover: true, progress: &|what| progress.say(what) };
-    Ok(cvg_calibration::identify_with_picture(open()?, &options)?)
+    Ok(cvg_calibration::identify_with_plots(open()?, &options)?)
 }
 
 /// Names of the results.

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cvg_calibration::recording::Campaign;
-use cvg_calibration::{Identification, Options, identify_with_picture};
+use cvg_calibration::{Identification, Options, identify_with_plots};
 use cvg_model::detection::{angle_error, angle_error_bound};
 use cvg_model::effects::EffectId;
 use cvg_simulator::Scenario;
@@ -50,7 +50,7 @@ pub(crate) fn paper(out: &Path) -> Result<(), Failure> {
     scenario()?.simulate().write(&campaign).map_err(Failure::input)?;
     output::tell(format_args!("identifying it with the paper's model"));
     let opened = Campaign::open(&campaign.join("campaign.toml"))?;
-    let identified = identify_with_picture(opened, &Options { discover: false, ..Options::default() })?;
+    let identified = identify_with_plots(opened, &Options { discover: false, ..Options::default() })?;
     let figures =
         [figure_2(), figure_3a(&identified), figure_3b(&identified), figure_4a(&identified), figure_4b(&identified)];
     for figure in &figures {
@@ -109,9 +109,9 @@ fn at_the_rate(identified: &Identification, name: &str) -> bool {
 }
 
 fn figure_3a(identified: &Identification) -> Figure {
-    let angles = identified.picture.as_ref().map(|p| p.angles.as_slice()).unwrap_or_default();
+    let angles = identified.plots.as_ref().map(|p| p.angles.as_slice()).unwrap_or_default();
     let curve = angles.iter().find(|c| at_the_rate(identified, &c.name));
-    let points = |y: fn(&cvg_calibration::picture::AngleCurve) -> &Vec<f64>| {
+    let points = |y: fn(&cvg_calibration::plots::AngleCurve) -> &Vec<f64>| {
         curve.map_or_else(Vec::new, |c| {
             let first = c.unwrapped_deg.first().copied().unwrap_or(0.0);
             let shown = c.unwrapped_deg.iter().take_while(|u| (*u - first).abs() < TURNS_DEG).count();
@@ -163,9 +163,9 @@ fn figure_4a(identified: &Identification) -> Figure {
 }
 
 fn figure_4b(identified: &Identification) -> Figure {
-    let drives = identified.picture.as_ref().map(|p| p.drives.as_slice()).unwrap_or_default();
+    let drives = identified.plots.as_ref().map(|p| p.drives.as_slice()).unwrap_or_default();
     let drive = drives.iter().find(|d| at_the_rate(identified, &d.name));
-    let points = |y: fn(&cvg_calibration::picture::DriveCurve) -> &Vec<f64>| {
+    let points = |y: fn(&cvg_calibration::plots::DriveCurve) -> &Vec<f64>| {
         drive.map_or_else(Vec::new, |d| d.pattern_deg.iter().copied().zip(y(d).iter().copied()).collect())
     };
     Figure {

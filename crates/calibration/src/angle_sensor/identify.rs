@@ -45,7 +45,7 @@ const ENOUGH_ROWS: usize = 3000;
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
-pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let rate_gyroscope = is_rate_gyroscope(&campaign);
     let stated = match campaign.pole_pairs {
         Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
@@ -67,7 +67,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool
     let finding =
         if rate_gyroscope { rate_finding(stated, period, &fitted)? } else { sensor_finding(stated, period, &fitted)? };
     (options.progress)("measuring the held-out error");
-    Ok(report(head, finding, &fitted, &held, pictured))
+    Ok(report(head, finding, &fitted, &held, with_plots))
 }
 
 /// Held-out rows below which an error says nothing.

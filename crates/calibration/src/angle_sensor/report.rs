@@ -3,7 +3,7 @@
 
 use super::samples::SensorRun;
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::picture::{Picture, picture_of};
+use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
@@ -81,7 +81,7 @@ pub(crate) fn report(
     finding: Finding<'_>,
     fitted: &[SensorRun],
     held: &[SensorRun],
-    pictured: bool,
+    with_plots: bool,
 ) -> Identification {
     let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
         let segments = runs.iter().map(|r| segment(r, errors(r), &finding)).collect();
@@ -126,7 +126,7 @@ pub(crate) fn report(
     let mut steps = stages(raw.as_ref(), &declared, &after, &[]);
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, &after)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
-    let picture = pictured.then(|| picture(&names, raw.as_ref(), &declared, &after, &finding));
+    let plots = with_plots.then(|| plots(&names, raw.as_ref(), &declared, &after, &finding));
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -168,7 +168,7 @@ pub(crate) fn report(
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: head.amplitude_v };
     let calibration = Calibration { device: head.device, hypothesis, provenance };
-    Identification { report, calibration, figures, steps: Vec::new(), picture }
+    Identification { report, calibration, figures, steps: Vec::new(), plots }
 }
 
 /// A run's errors as the residual diagnostics take them.
@@ -223,7 +223,7 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
         gain: None,
         rivals: Vec::new(),
         energy_balance: None,
-        doubt: None,
+        inconsistency: None,
     }
 }
 
@@ -329,12 +329,12 @@ fn curves(
         .collect()
 }
 
-fn picture(
+fn plots(
     names: &[String],
     raw: Option<&Evaluation>,
     declared: &Evaluation,
     after: &Evaluation,
     finding: &Finding<'_>,
-) -> Picture {
-    picture_of(names, raw, declared, after, &finding.hypothesis)
+) -> PlotData {
+    plots_of(names, raw, declared, after, &finding.hypothesis)
 }

@@ -44,13 +44,13 @@ impl Gain {
 
 /// What a run tells of the angular gain: all of it, and its parts in the order of time.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Told {
+pub(crate) struct RunGain {
     pub(crate) run: String,
     pub(crate) all: Gain,
     pub(crate) parts: Vec<Gain>,
 }
 
-impl Told {
+impl RunGain {
     /// Two parts that contradict each other.
     fn contradiction(&self) -> Option<[Gain; 2]> {
         let pairs = self.parts.iter().enumerate().flat_map(|(i, a)| self.parts[i + 1..].iter().map(move |b| [*a, *b]));
@@ -70,7 +70,7 @@ pub(crate) enum Verdict {
 }
 
 /// Compares the runs of a campaign.
-pub(crate) fn verdict(runs: &[Told]) -> Verdict {
+pub(crate) fn verdict(runs: &[RunGain]) -> Verdict {
     let middle = median(&mut runs.iter().map(|r| r.all.value).collect::<Vec<_>>());
     // of runs that agree with the median: a median of two is one of them
     let common = Gain { value: middle, within: 0.0 };
@@ -100,14 +100,15 @@ pub(crate) fn verdict(runs: &[Told]) -> Verdict {
 mod tests {
     use super::*;
 
-    fn told(run: &str, k: f64) -> Told {
+    fn run_gain(run: &str, k: f64) -> RunGain {
         let gain = |value| Gain::new(value, 0.004, std::f64::consts::PI, 170.0, [8.7, 0.0]);
-        Told { run: run.into(), all: gain(k), parts: vec![gain(k), gain(k)] }
+        RunGain { run: run.into(), all: gain(k), parts: vec![gain(k), gain(k)] }
     }
 
     #[test]
     fn one_run_of_sixty_is_left_out_by_name() {
-        let mut runs: Vec<Told> = (0..60).map(|i| told(&format!("{i}.csv"), 0.78 + 1e-5 * f64::from(i))).collect();
+        let mut runs: Vec<RunGain> =
+            (0..60).map(|i| run_gain(&format!("{i}.csv"), 0.78 + 1e-5 * f64::from(i))).collect();
         runs[17].all.value = 0.75;
         let Verdict::Out(out) = verdict(&runs) else { panic!() };
         assert!(matches!(out.as_slice(), [(17, why)] if why.contains("0.75000")), "{out:?}");
@@ -115,16 +116,18 @@ mod tests {
 
     #[test]
     fn of_two_runs_neither_is_right() {
-        let Verdict::Open { problem, .. } = verdict(&[told("a.csv", 0.78), told("b.csv", 0.70)]) else { panic!() };
+        let Verdict::Open { problem, .. } = verdict(&[run_gain("a.csv", 0.78), run_gain("b.csv", 0.70)]) else {
+            panic!()
+        };
         assert!(problem.contains("a.csv 0.78000, b.csv 0.70000"), "{problem}");
     }
 
     #[test]
     fn a_run_that_changes_halfway_is_odd() {
-        let mut run = told("a.csv", 0.78);
+        let mut run = run_gain("a.csv", 0.78);
         run.parts[1].value = 0.74;
         assert!(matches!(verdict(std::slice::from_ref(&run)), Verdict::Open { .. }));
-        let Verdict::Out(out) = verdict(&[told("b.csv", 0.78), run, told("c.csv", 0.78)]) else { panic!() };
+        let Verdict::Out(out) = verdict(&[run_gain("b.csv", 0.78), run, run_gain("c.csv", 0.78)]) else { panic!() };
         assert_eq!(out.len(), 1);
     }
 

@@ -4,5 +4,5 @@ pub mod allan;
 pub(crate) mod at_rest;
 pub(crate) mod decomposition;
 pub(crate) mod evaluate;
-pub mod picture;
+pub mod plots;
 pub(crate) mod residual;

@@ -9,7 +9,7 @@ use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimation::fit::{Prepared, scaled_inverse};
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::statistics::median;
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::model::unknowns::Unknowns;
@@ -59,9 +59,9 @@ pub(crate) fn energy_balance(
     for (p, starts) in tracks.iter().zip(starts) {
         for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
             let (mut origin, mut sum, mut samples) = (None, DVector::zeros(n + 1), 0.0);
-            let pace = Pace { stride: p.track.stride, spike: p.limit.angle };
-            walk(&p.track, segment, hypothesis, &unknowns, *start, pace, |row| {
-                if row.angle.abs() > pace.spike {
+            let stepping = Stepping { stride: p.track.stride, spike: p.limit.angle };
+            propagate(&p.track, segment, hypothesis, &unknowns, *start, stepping, |row| {
+                if row.angle.abs() > stepping.spike {
                     return;
                 }
                 let columns = row.amplitude_slopes.iter().copied().chain([row.amplitude]);

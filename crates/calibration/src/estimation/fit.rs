@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::data::track::{Segment, Track};
 use crate::estimation::coloured_noise::DRIFT_RAD_S;
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::sums::{Own, Sums};
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::model::unknowns::Unknowns;
@@ -307,8 +307,8 @@ fn collect(
 ) -> Vec<Sums> {
     let Prepared { track, noise, .. } = prepared;
     let limit = Noise { angle: widened * prepared.limit.angle, amplitude: widened * prepared.limit.amplitude };
-    let worth = stride / track.stride;
-    let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * worth as f64);
+    let weight = stride / track.stride;
+    let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * weight as f64);
     track
         .segments
         .iter()
@@ -319,20 +319,20 @@ fn collect(
             let mut slopes = vec![0.0; unknowns.all.len()];
             let first = track.t_s[segment.range.start];
             if segment.role == role {
-                let pace = Pace { stride, spike: limit.angle };
-                walk(track, segment, hypothesis, unknowns, *start, pace, |row| {
+                let stepping = Stepping { stride, spike: limit.angle };
+                propagate(track, segment, hypothesis, unknowns, *start, stepping, |row| {
                     if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
                         let time = track.t_s[row.index] - first;
                         slopes.copy_from_slice(row.angle_slopes);
                         own.reduce(time, &mut slopes);
                         Sums::add(&mut sums.angle, weights[0], time, &slopes, row.angle);
-                        sums.counted[0] += worth;
+                        sums.counted[0] += weight;
                         if weights[1] > 0.0 {
                             Sums::add(&mut sums.amplitude, weights[1], time, row.amplitude_slopes, row.amplitude);
-                            sums.counted[1] += worth;
+                            sums.counted[1] += weight;
                         }
                     } else {
-                        sums.set_aside += worth;
+                        sums.set_aside += weight;
                     }
                 });
             }
@@ -432,8 +432,8 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
                 let mut angle = Scores::new(n, own);
                 let mut amplitude = Scores::new(n, Own::new(0.0, None));
                 let first = prepared.track.t_s[segment.range.start];
-                let pace = Pace { stride: prepared.track.stride, spike: prepared.limit.angle };
-                walk(&prepared.track, segment, &fit.hypothesis, &sorted, *start, pace, |row| {
+                let stepping = Stepping { stride: prepared.track.stride, spike: prepared.limit.angle };
+                propagate(&prepared.track, segment, &fit.hypothesis, &sorted, *start, stepping, |row| {
                     if row.angle.abs() <= prepared.limit.angle {
                         let time = prepared.track.t_s[row.index] - first;
                         angle.add(prepared.noise.angle.powi(-2), time, row.angle, row.angle_slopes);

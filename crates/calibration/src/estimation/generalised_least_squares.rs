@@ -3,7 +3,7 @@
 //! The fit before it weighs residuals as if they were white, so that a walk of the angle outvotes the ring-downs. Here each
 //! kind of coloured noise has the most likely strength ([`crate::restricted_likelihood`]), a filter along each segment
 //! whitens the residuals ([`crate::coloured_noise`]), and the step is repeated, linearised anew, until it no longer
-//! moves. Runs are walked sample by sample and never stored.
+//! moves. Runs are propagated sample by sample and never stored.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::estimation::coloured_noise::{ColouredNoise, Filter, Observation, Surroundings, Whitened};
 use crate::estimation::fit::{Fit, LARGEST_TURN, Prepared, Prior};
 use crate::estimation::normal::Normal;
-use crate::estimation::propagation::{Pace, Row, Start, walk};
+use crate::estimation::propagation::{Row, Start, Stepping, propagate};
 use crate::estimation::restricted_likelihood::{Sampled, strengths};
 use crate::model::hypothesis::{Unknown, direction};
 use crate::model::unknowns::Unknowns;
@@ -76,15 +76,15 @@ impl Problem<'_> {
     }
 
     /// Walks a segment and hands each sample that is no spike to `take`, with the time since the segment's start.
-    fn walk(&self, fit: &Fit, (t, s): (usize, usize), mut take: impl FnMut(&Observation<'_>, f64)) {
+    fn propagate(&self, fit: &Fit, (t, s): (usize, usize), mut take: impl FnMut(&Observation<'_>, f64)) {
         let p = &self.tracks[t];
         let segment = &p.track.segments[s];
         let n = self.unknowns.all.len();
         let mut columns = vec![0.0; n + 1];
         let first = p.track.t_s[segment.range.start];
         let mut before = None;
-        let pace = Pace { stride: p.track.stride, spike: p.limit.angle };
-        walk(&p.track, segment, &fit.hypothesis, &self.unknowns, fit.starts[t][s], pace, |row: &Row<'_>| {
+        let stepping = Stepping { stride: p.track.stride, spike: p.limit.angle };
+        propagate(&p.track, segment, &fit.hypothesis, &self.unknowns, fit.starts[t][s], stepping, |row: &Row<'_>| {
             if row.angle.abs() > p.limit.angle {
                 return;
             }
@@ -121,7 +121,7 @@ impl Problem<'_> {
                 let averaged = resolved.min(count / ENOUGH).max(1);
                 let thinned = (count / averaged).div_ceil(MOST).max(1);
                 let mut sampled = Sampled::new(n, self.surroundings(fit, at), averaged, thinned);
-                self.walk(fit, at, |o, _| sampled.take(o));
+                self.propagate(fit, at, |o, _| sampled.take(o));
                 sampled
             })
             .filter(|s| s.len() > FEWEST)
@@ -142,7 +142,7 @@ impl Problem<'_> {
             .map(|at| {
                 let mut filter = Filter::new(n, noise, self.surroundings(fit, at));
                 let (mut means, mut mean_time_s, mut count) = (vec![0.0; n + 1], 0.0, 0.0);
-                self.walk(fit, at, |o, time_s| {
+                self.propagate(fit, at, |o, time_s| {
                     filter.take(o);
                     count += 1.0;
                     for (m, v) in means.iter_mut().zip(o.columns) {

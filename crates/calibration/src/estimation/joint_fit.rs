@@ -9,7 +9,7 @@ use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
 use crate::estimation::identifiability::Alike;
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
 use crate::estimation::statistics::{median, robust_deviation, white_noise};
@@ -58,7 +58,7 @@ const LEAST_NOISE: f64 = 1e-9;
 
 /// A campaign made ready for fits.
 #[derive(Debug)]
-pub(crate) struct Bench {
+pub(crate) struct Dataset {
     pub(crate) instrument: Instrument,
     pub(crate) tracks: Vec<Prepared>,
     pub(crate) start: Hypothesis,
@@ -76,7 +76,7 @@ pub(crate) struct Bench {
     pub(crate) screen: Screen,
 }
 
-impl Bench {
+impl Dataset {
     /// Prepares a campaign.
     ///
     /// # Errors
@@ -315,9 +315,9 @@ impl Bench {
                 let stride = p.track.stride;
                 let mut last: Option<(f64, [f64; 3])> = None;
                 let (mut sums, mut rows) = ([0.0; 3], Vec::new());
-                let pace = Pace { stride, spike: p.limit.angle };
-                walk(&p.track, segment, hypothesis, &none, *start, pace, |row| {
-                    if row.angle.abs() > pace.spike {
+                let stepping = Stepping { stride, spike: p.limit.angle };
+                propagate(&p.track, segment, hypothesis, &none, *start, stepping, |row| {
+                    if row.angle.abs() > stepping.spike {
                         return;
                     }
                     let pendulum = row.vibration.pendulum();
@@ -472,7 +472,7 @@ const SAME_NOISE: f64 = 1.5;
 ///
 /// # Errors
 /// Where a ring-down is not one.
-pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) -> Result<Fitted, Refusal> {
+pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis) -> Result<Fitted, Refusal> {
     let mut hypothesis = hypothesis.clone();
     hypothesis.control_latency_s = 0.0;
     if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
@@ -483,7 +483,7 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
     loop {
         // the drive first: it multiplies all that the commands do
         let ring_downs =
-            bench.ring_down_runs.iter().map(|r| ring_down(r, &hypothesis)).collect::<Result<Vec<_>, _>>()?;
+            dataset.ring_down_runs.iter().map(|r| ring_down(r, &hypothesis)).collect::<Result<Vec<_>, _>>()?;
         let drive = DriveGains::from_ring_downs(&ring_downs);
         match &drive {
             Some(d) => {
@@ -494,30 +494,30 @@ pub(crate) fn fit_with_ring_downs(bench: &mut Bench, hypothesis: &Hypothesis) ->
                     hypothesis.set(Unknown::Effect(member, 0), d.ratio());
                 }
             }
-            None => bench.balance_energy(&mut hypothesis),
+            None => dataset.balance_energy(&mut hypothesis),
         }
-        bench.balance_quadrature(&hypothesis);
+        dataset.balance_quadrature(&hypothesis);
         let last = round + 1 >= ROUNDS;
-        bench.drive_is_free =
-            last && bench.tracks_differ() && (explains == Some(true) || bench.excess() < LARGEST_EXCESS);
+        dataset.drive_is_free =
+            last && dataset.tracks_differ() && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
         let (result, settled) =
-            bench.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
+            dataset.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
         hypothesis = result.hypothesis.clone();
         round += 1;
         if !last || !(settled || round >= MOST_ROUNDS) {
             continue;
         }
-        if explains.is_none() && !bench.drive_is_free && bench.tracks_differ() {
-            let (held, before) = (bench.state(), bench.excess());
-            bench.drive_is_free = true;
-            let (freed, _) = bench.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
-            explains = Some(bench.excess() < DRIVES_SHARE * before);
+        if explains.is_none() && !dataset.drive_is_free && dataset.tracks_differ() {
+            let (held, before) = (dataset.state(), dataset.excess());
+            dataset.drive_is_free = true;
+            let (freed, _) = dataset.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
+            explains = Some(dataset.excess() < DRIVES_SHARE * before);
             if explains == Some(true) {
                 (hypothesis, round) = (freed.hypothesis, ROUNDS);
                 continue;
             }
-            bench.drive_is_free = false;
-            bench.restore(held);
+            dataset.drive_is_free = false;
+            dataset.restore(held);
         }
         return Ok(Fitted { fit: result, ring_downs, drive });
     }

@@ -53,16 +53,16 @@ pub(crate) struct Start {
     pub(crate) drift: f64,
 }
 
-/// How a segment is walked.
+/// How a segment is propagated.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Pace {
+pub(crate) struct Stepping {
     /// every how many samples
     pub(crate) stride: usize,
     /// a residual of the angle beyond this, rad, is a spike: the integrals pass over its sample
     pub(crate) spike: f64,
 }
 
-impl Pace {
+impl Stepping {
     /// Every `stride` samples, all believed.
     pub(crate) fn every(stride: usize) -> Self {
         Self { stride, spike: f64::INFINITY }
@@ -73,16 +73,16 @@ impl Pace {
 const MOST_PASSED_OVER: usize = 3;
 
 /// Walks `segment` and hands each row to `take`.
-pub(crate) fn walk(
+pub(crate) fn propagate(
     track: &Track,
     segment: &Segment,
     hypothesis: &Hypothesis,
     unknowns: &Unknowns,
     start: Start,
-    pace: Pace,
+    stepping: Stepping,
     mut take: impl FnMut(&Row<'_>),
 ) {
-    let stride = pace.stride;
+    let stride = stepping.stride;
     let n = unknowns.all.len();
     let predictor = Predictor::new(hypothesis, unknowns);
     let mut vibration = Vibration::new();
@@ -128,7 +128,7 @@ pub(crate) fn walk(
             + sense * hypothesis.angular_gain * input;
         let off = wrapped(vibration.theta - along - integrals.ahead(track.t_s[i]), hypothesis.period_rad);
         if hypothesis.instrument == Instrument::Gyroscope {
-            let believed = off.abs() <= pace.spike || integrals.known == 0 || passed_over == MOST_PASSED_OVER;
+            let believed = off.abs() <= stepping.spike || integrals.known == 0 || passed_over == MOST_PASSED_OVER;
             passed_over = if believed { 0 } else { passed_over + 1 };
             if believed {
                 integrals.extend_to(track.t_s[i], &integrands);

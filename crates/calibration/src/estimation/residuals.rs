@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::data::track::{Segment, Track};
 use crate::estimation::fit::{Prepared, thinning};
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::statistics::circular_mean;
 use crate::model::hypothesis::{Hypothesis, direction};
 use crate::model::unknowns::Unknowns;
@@ -61,12 +61,12 @@ pub(crate) fn residuals(
                     if role == Role::Holdout {
                         // nothing was fitted here: where the segment starts is found first
                         let mut angles = Vec::new();
-                        let coarse = Pace::every(thinning(track, hypothesis, segment.range.len(), START_SAMPLES));
-                        walk(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
+                        let coarse = Stepping::every(thinning(track, hypothesis, segment.range.len(), START_SAMPLES));
+                        propagate(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
                         start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
                     }
-                    let pace = Pace { stride, spike: prepared.limit.angle };
-                    walk(track, &segment, hypothesis, &none, start, pace, |row| r.push(track, row));
+                    let stepping = Stepping { stride, spike: prepared.limit.angle };
+                    propagate(track, &segment, hypothesis, &none, start, stepping, |row| r.push(track, row));
                     out.push(r);
                 }
             }

@@ -2,7 +2,7 @@
 //!
 //! What is broken in a run is left out, rows or all of it, and named; what cannot be told from being right is refused.
 
-use crate::data::agreement::{Gain, Told, Verdict, verdict};
+use crate::data::agreement::{Gain, RunGain, Verdict, verdict};
 use crate::data::plausibility::mend;
 use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, sampling, spread_over};
 use crate::data::slips::slips;
@@ -147,8 +147,8 @@ impl Screen {
         }
         let mut moving = self.without(moving, &odd, warnings);
         if start.instrument == Instrument::Gyroscope {
-            let told: Vec<Told> = moving.iter().map(|(t, m)| told(t, m, start.period_rad)).collect();
-            match verdict(&told) {
+            let gains: Vec<RunGain> = moving.iter().map(|(t, m)| run_gain(t, m, start.period_rad)).collect();
+            match verdict(&gains) {
                 Verdict::Out(odd) => moving = self.without(moving, &odd, warnings),
                 Verdict::Open { run, problem } => {
                     return Err(Refusal::no_answer(
@@ -235,7 +235,7 @@ fn steps(track: &Track, hypothesis: &Hypothesis) -> Steps {
 }
 
 /// What a run tells of the angular gain.
-fn told(track: &Track, motion: &Motion, period: f64) -> Told {
+fn run_gain(track: &Track, motion: &Motion, period: f64) -> RunGain {
     let (low, high) = track
         .segments
         .iter()
@@ -243,7 +243,7 @@ fn told(track: &Track, motion: &Motion, period: f64) -> Told {
         .map(|i| track.input_rad[i])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let all = Gain::new(motion.angular_gain, motion.deviation, period, high - low, track.speed_and_drift());
-    Told { run: track.name.clone(), all, parts: motion.halves.clone() }
+    RunGain { run: track.name.clone(), all, parts: motion.halves.clone() }
 }
 
 /// Ends a segment where the angle jumps against the input, and begins another; says where, and whether there was any.

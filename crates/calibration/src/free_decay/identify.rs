@@ -93,7 +93,7 @@ const FEWEST_HELD: usize = 16;
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
-pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool) -> Result<Identification, Refusal> {
+pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let mut head = Head::of(&campaign);
     (options.progress)("preparing the decays");
     let runs: Vec<DecayRun> =
@@ -139,7 +139,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, pictured: bool
         if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };
     let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
     let finding = Finding { chosen, fit: final_fit, declared: final_declared, phase, errors };
-    report(head, &finding, &fitted, &held, pictured)
+    report(head, &finding, &fitted, &held, with_plots)
 }
 
 fn sound(fit: &Fit, device: &str) -> Result<(), Refusal> {

@@ -11,7 +11,7 @@ use super::phase::Phase;
 use super::runs::DecayRun;
 use super::selection::Chosen;
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::picture::picture_of;
+use crate::diagnostics::plots::plots_of;
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
@@ -65,7 +65,7 @@ pub(crate) fn report(
     finding: &Finding,
     fitted: &[DecayRun],
     held: &[DecayRun],
-    pictured: bool,
+    with_plots: bool,
 ) -> Result<Identification, Refusal> {
     let Errors { raw: raw_errors, declared, after: found } = &finding.errors;
     let on_fit = whole(fitted, &finding.fit);
@@ -79,7 +79,7 @@ pub(crate) fn report(
     let mut steps = stages(Some(raw_errors), declared, found, &[]);
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, finding)));
     let names: Vec<String> = if held.is_empty() { fitted } else { held }.iter().map(|r| r.name.clone()).collect();
-    let picture = pictured.then(|| picture_of(&names, Some(raw_errors), declared, found, &hypothesis));
+    let plots = with_plots.then(|| plots_of(&names, Some(raw_errors), declared, found, &hypothesis));
     let report = Report {
         schema: SCHEMA.into(),
         status: Status::Answered,
@@ -119,7 +119,7 @@ pub(crate) fn report(
     let figures = Figures { bias: curves(&names, raw_errors, declared, found), ring_downs: Vec::new() };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: None };
     let calibration = Calibration { device: head.device, hypothesis, provenance };
-    Ok(Identification { report, calibration, figures, steps: Vec::new(), picture })
+    Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })
 }
 
 pub(crate) fn estimate(fit: &Fit, term: Term) -> Estimate {
@@ -257,7 +257,7 @@ fn step(e: &EffectReport, finding: &Finding) -> StepReport {
         gain: added.map(|a| a.gain),
         rivals: added.map(super::effects::rivals).unwrap_or_default(),
         energy_balance: None,
-        doubt: None,
+        inconsistency: None,
     }
 }
 

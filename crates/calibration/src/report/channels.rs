@@ -22,8 +22,8 @@ use crate::diagnostics::residual::{
 };
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::Bench;
-use crate::estimation::propagation::{Pace, Row, walk};
+use crate::estimation::joint_fit::Dataset;
+use crate::estimation::propagation::{Row, Stepping, propagate};
 use crate::estimation::residuals::Residual;
 use crate::model::hypothesis::Hypothesis;
 use crate::model::unknowns::Unknowns;
@@ -78,11 +78,11 @@ fn v_qc(sample: &Sample<'_>) -> f64 {
 }
 
 /// The analysis of every channel that was recorded, angle first.
-pub(crate) fn channels(bench: &Bench, fit: &Fit, stage: &str, angle: &Evaluation) -> Vec<ChannelReport> {
-    let closed = energy_balance(&bench.tracks, &fit.hypothesis, &fit.starts)
+pub(crate) fn channels(dataset: &Dataset, fit: &Fit, stage: &str, angle: &Evaluation) -> Vec<ChannelReport> {
+    let closed = energy_balance(&dataset.tracks, &fit.hypothesis, &fit.starts)
         .map_or_else(|| fit.hypothesis.clone(), |balance| balance.closed);
-    let all = |f: fn(&crate::data::track::Track) -> bool| bench.tracks.iter().all(|p| f(&p.track));
-    let gyroscope = bench.instrument == Instrument::Gyroscope;
+    let all = |f: fn(&crate::data::track::Track) -> bool| dataset.tracks.iter().all(|p| f(&p.track));
+    let gyroscope = dataset.instrument == Instrument::Gyroscope;
     let commands = gyroscope && all(crate::data::track::Track::has_commands) && closed.force_scale != 0.0;
     let recorded = [
         (all(crate::data::track::Track::has_amplitude), Channel { name: "amplitude", unit: "1", of: amplitude }),
@@ -94,7 +94,7 @@ pub(crate) fn channels(bench: &Bench, fit: &Fit, stage: &str, angle: &Evaluation
         ),
     ];
     let recorded: Vec<Channel> = recorded.into_iter().filter_map(|(there, channel)| there.then_some(channel)).collect();
-    let (others, amplitudes) = left(bench, fit, &closed, &recorded);
+    let (others, amplitudes) = left(dataset, fit, &closed, &recorded);
     let all: Vec<_> = std::iter::once(("angle", "deg", angle))
         .chain(recorded.iter().zip(&others).map(|(channel, evaluation)| (channel.name, channel.unit, evaluation)))
         .collect();
@@ -102,18 +102,18 @@ pub(crate) fn channels(bench: &Bench, fit: &Fit, stage: &str, angle: &Evaluation
 }
 
 /// What is left of each channel in the fitted segments, and the mean amplitude of each segment.
-fn left(bench: &Bench, fit: &Fit, closed: &Hypothesis, channels: &[Channel]) -> (Vec<Evaluation>, Vec<f64>) {
+fn left(dataset: &Dataset, fit: &Fit, closed: &Hypothesis, channels: &[Channel]) -> (Vec<Evaluation>, Vec<f64>) {
     let none = Unknowns::new(closed, Vec::new());
     let mut segments: Vec<Vec<Residual>> = vec![Vec::new(); channels.len()];
     let mut amplitudes = Vec::new();
-    for (number, (p, starts)) in bench.tracks.iter().zip(&fit.starts).enumerate() {
+    for (number, (p, starts)) in dataset.tracks.iter().zip(&fit.starts).enumerate() {
         for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
             let stride = p.track.stride;
             let mut base = Residual::new(number, segment);
             let mut values: Vec<Vec<f64>> = vec![Vec::new(); channels.len()];
             let mut ln_amplitude = 0.0;
-            let pace = Pace { stride, spike: p.limit.angle };
-            walk(&p.track, segment, closed, &none, *start, pace, |row| {
+            let stepping = Stepping { stride, spike: p.limit.angle };
+            propagate(&p.track, segment, closed, &none, *start, stepping, |row| {
                 base.push(&p.track, row);
                 ln_amplitude += row.ln_amplitude;
                 let v_qc = p.track.commands(row.index, stride).map_or(0.0, |c| c.now.v_qc);

@@ -5,7 +5,7 @@ use cvg_model::effects::{EffectId, Moment, Stage};
 
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
@@ -55,7 +55,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let none = Unknowns::new(h, Vec::new());
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     for segment in &track.segments {
-        walk(&track, segment, h, &none, Start::default(), Pace::every(1), |row| {
+        propagate(&track, segment, h, &none, Start::default(), Stepping::every(1), |row| {
             let i = row.index;
             let at = Moment {
                 t_s: track.t_s[i],

@@ -248,7 +248,7 @@ pub struct StepReport {
     /// rms of what the energy balance leaves of ln a, before and after
     pub energy_balance: Option<[f64; 2]>,
     /// why a cause is not claimed
-    pub doubt: Option<String>,
+    pub inconsistency: Option<String>,
 }
 
 /// An effect that was beaten.

@@ -4,7 +4,7 @@ use crate::data::agreement::Gain;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
 use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::Bench;
+use crate::estimation::joint_fit::Dataset;
 use crate::estimation::residuals::{Residual, Window, residuals};
 use crate::recording::Role;
 use crate::report::{Estimate, RunReport};
@@ -49,15 +49,15 @@ impl Slope {
 /// Fills in what every run that was fitted or held out tells by itself; says which of them do not agree with the rest.
 pub(crate) fn tell_apart(
     runs: &mut [RunReport],
-    bench: &Bench,
+    dataset: &Dataset,
     fit: &Fit,
     (on_fit, held_out): (&Evaluation, &Evaluation),
 ) -> Vec<String> {
     let memory = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
     let left: [Vec<Vec<Residual>>; 2] = [Role::Fit, Role::Holdout]
-        .map(|role| residuals(&bench.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole));
+        .map(|role| residuals(&dataset.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole));
     let mut warnings = Vec::new();
-    for (at, (run, track)) in bench.screen.of(runs).into_iter().zip(&bench.tracks).enumerate() {
+    for (at, (run, track)) in dataset.screen.of(runs).into_iter().zip(&dataset.tracks).enumerate() {
         let fitted = !left[0][at].is_empty();
         let (residuals, evaluation) = if fitted { (&left[0][at], on_fit) } else { (&left[1][at], held_out) };
         let kept: Vec<&Vec<bool>> =
@@ -90,7 +90,7 @@ pub(crate) fn tell_apart(
             warnings.push(format!("{}: its angular gain is {own:.5}, that of all runs {k:.5}", track.track.name));
         }
     }
-    for run in bench.screen.left_out_of(runs) {
+    for run in dataset.screen.left_out_of(runs) {
         run.agrees = Some(false);
         run.r#use = "left out".into();
     }

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use crate::estimation::fit::{Effort, fit};
-use crate::estimation::joint_fit::{Bench, Fitted};
+use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::linear::NormalEquations;
 use crate::estimation::residuals::{Residual, Window, residuals};
 use crate::estimation::statistics::robust_deviation;
@@ -38,26 +38,26 @@ const UNKNOWNS: usize = 5;
 
 /// Rate, deg/s, and angular gain of each run. Every run drifts by itself in a fit of its own: a gain that goes with the rate
 /// would else be taken for what the drive does.
-pub(crate) fn gains(bench: &mut Bench, fitted: &Fitted) -> Vec<(f64, Estimate)> {
-    let priors = bench.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
-    let balance = bench.energy_balance;
-    let drifted: Vec<bool> = bench.tracks.iter().map(|t| t.drifts).collect();
-    bench.tracks.iter_mut().for_each(|t| t.drifts = true);
+pub(crate) fn gains(dataset: &mut Dataset, fitted: &Fitted) -> Vec<(f64, Estimate)> {
+    let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
+    let balance = dataset.energy_balance;
+    let drifted: Vec<bool> = dataset.tracks.iter().map(|t| t.drifts).collect();
+    dataset.tracks.iter_mut().for_each(|t| t.drifts = true);
     // what the drive does is taken as it is believed to be: a gain that goes with the rate bends what is fitted of it
     let mut hypothesis = Hypothesis { control_latency_s: 0.0, ..fitted.fit.hypothesis.clone() };
     match &fitted.drive {
         Some(drive) => hypothesis.force_scale = drive.mean(),
-        None => bench.balance_energy(&mut hypothesis),
+        None => dataset.balance_energy(&mut hypothesis),
     }
     let of_the_drive = |u: &Unknown| matches!(u, Unknown::ForceScale | Unknown::ControlLatency);
     let unknowns: Vec<Unknown> = fitted.fit.unknowns.iter().copied().filter(|u| !of_the_drive(u)).collect();
-    let mut free = fit(&bench.tracks, &hypothesis, &unknowns, &priors, Role::Fit, Effort::FULL);
+    let mut free = fit(&dataset.tracks, &hypothesis, &unknowns, &priors, Role::Fit, Effort::FULL);
     free.starts.iter_mut().flatten().for_each(|start| start.drift = 0.0);
-    let segments = residuals(&bench.tracks, &free.hypothesis, &free.starts, Role::Fit, Window::Whole);
-    bench.tracks.iter_mut().zip(drifted).for_each(|(t, drifts)| t.drifts = drifts);
-    bench.energy_balance = balance;
+    let segments = residuals(&dataset.tracks, &free.hypothesis, &free.starts, Role::Fit, Window::Whole);
+    dataset.tracks.iter_mut().zip(drifted).for_each(|(t, drifts)| t.drifts = drifts);
+    dataset.energy_balance = balance;
     let (k, sense) = (free.hypothesis.angular_gain, free.hypothesis.sense());
-    let told = bench.tracks.iter().zip(segments).filter_map(|(track, segments)| {
+    let told = dataset.tracks.iter().zip(segments).filter_map(|(track, segments)| {
         let (slope, deviation) = slope(&segments)?;
         let (value, half) = (k + sense * slope, (STUDENT_9 * deviation).hypot(1.96 * DRIVE * k));
         Some((track.track.mean_rate().to_degrees(), Estimate { value, ci95: [value - half, value + half] }))

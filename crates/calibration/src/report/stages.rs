@@ -22,7 +22,7 @@ pub(crate) fn stages(
         gain: None,
         rivals: Vec::new(),
         energy_balance: None,
-        doubt: None,
+        inconsistency: None,
     };
     let before = raw.map(|e| plain("raw", e)).into_iter().chain([plain("declared", declared)]);
     before.chain(steps.iter().map(found)).collect()
@@ -40,6 +40,6 @@ fn found(step: &Step) -> StepReport {
         gain: Some(step.gain),
         rivals: step.rivals.iter().map(rival).collect(),
         energy_balance: step.energy_balance,
-        doubt: step.doubt.clone(),
+        inconsistency: step.inconsistency.clone(),
     }
 }

@@ -7,7 +7,7 @@ use crate::diagnostics::residual::{
     Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
     strongest_line,
 };
-use crate::estimation::joint_fit::Bench;
+use crate::estimation::joint_fit::Dataset;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::report::Unexplained;
 use crate::selection::discovery::Step;
@@ -37,8 +37,8 @@ pub(crate) fn described(hypothesis: &Hypothesis, steps: &[Step]) -> Vec<Unexplai
                 (before * before - after * after).max(0.0).sqrt()
             });
             let (class, n, frequency_hz) = class(m);
-            let suggestion = match step.and_then(|s| s.doubt.as_ref()) {
-                Some(doubt) => format!("corrected as {}, which is not its cause: {doubt}", m.id),
+            let suggestion = match step.and_then(|s| s.inconsistency.as_ref()) {
+                Some(inconsistency) => format!("corrected as {}, which is not its cause: {inconsistency}", m.id),
                 None => format!("corrected as {}, without a known cause", m.id),
             };
             Unexplained { class: class.into(), n, frequency_hz, rms_deg: removed, suggestion }
@@ -66,7 +66,7 @@ fn class(m: &Member) -> (&'static str, Option<u32>, Option<f64>) {
 
 /// Lists what the residual still holds.
 pub(crate) fn unexplained(
-    bench: &Bench,
+    dataset: &Dataset,
     on_fit: &Evaluation,
     dense: &Evaluation,
     heldout: &Evaluation,
@@ -97,7 +97,7 @@ pub(crate) fn unexplained(
             }
         }
     }
-    let worth_saying = bench.speeds_differ() || out.is_empty();
+    let worth_saying = dataset.speeds_differ() || out.is_empty();
     let least = count * (SMALLEST_SHARE * floor).powi(2);
     let line = worth_saying.then(|| strongest_line(dense, Along::Time, least)).flatten();
     if let Some((frequency, power)) = line.filter(|(_, power)| remarkable(*power, count)) {

@@ -7,7 +7,7 @@ use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{
     Along, Follows, drift_power, resolved_harmonics, strongest_harmonics, strongest_line,
 };
-use crate::estimation::joint_fit::Bench;
+use crate::estimation::joint_fit::Dataset;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::Instrument;
 
@@ -29,22 +29,22 @@ pub(crate) struct Candidate {
     pub(crate) tried: f64,
 }
 
-/// Every way to extend a hypothesis on this bench.
+/// Every way to extend a hypothesis on this dataset.
 pub(crate) fn candidates(
-    bench: &Bench,
+    dataset: &Dataset,
     hypothesis: &Hypothesis,
     residual: &Evaluation,
     dense: &Evaluation,
 ) -> Vec<Candidate> {
-    let sensor = bench.instrument == Instrument::Sensor;
-    let commands = bench.tracks.iter().any(|t| t.track.has_commands());
+    let sensor = dataset.instrument == Instrument::Sensor;
+    let commands = dataset.tracks.iter().any(|t| t.track.has_commands());
     let mut out = Vec::new();
     for &id in EffectId::ALL {
         let d = id.description();
         if d.declared || (sensor && !d.in_sensors) || (d.stage == Stage::Actuation && !commands) {
             continue;
         }
-        if d.scaling.rate > 0 && !bench.rate_varies() {
+        if d.scaling.rate > 0 && !dataset.rate_varies() {
             // a constant per rate hides in the bias of each run
             continue;
         }
@@ -62,7 +62,7 @@ pub(crate) fn candidates(
                     .iter()
                     .any(|m| m.id == id && same(p, &m.values) && chosen.is_none_or(|c| same(c, &m.values)))
             };
-            let (found, tried) = proposals(bench, residual, dense, over);
+            let (found, tried) = proposals(dataset, residual, dense, over);
             let proposed = found.into_iter().map(|(value, choice)| {
                 let mut values = id.neutral();
                 values[p] = value;
@@ -81,7 +81,7 @@ pub(crate) fn candidates(
         match hypothesis.position(id) {
             None if d.onsets.is_empty() => out.push(plain),
             None => {
-                let amplitude = largest_component(bench);
+                let amplitude = largest_component(dataset);
                 for onset in d.onsets {
                     let mut values = id.neutral();
                     values[0] = onset / amplitude;
@@ -102,11 +102,11 @@ pub(crate) fn candidates(
 
 /// Values that a searched parameter could take with what goes with each of them, strongest first, and how many were
 /// looked at.
-fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<(f64, f64)>, f64) {
+fn proposals(dataset: &Dataset, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<(f64, f64)>, f64) {
     match over {
         Search::PatternHarmonic => {
             let most = resolved_harmonics(residual, Follows::Pattern, PATTERN_HARMONICS);
-            let scalings = scalings(bench);
+            let scalings = scalings(dataset);
             let mut found: Vec<(f64, f64, f64)> = Vec::new();
             for &scaling in &scalings {
                 let size = |precession: f64| harmonic_n::factor(scaling, precession);
@@ -118,7 +118,7 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
             let anisodamping = (2.0, harmonic_n::scaling::INVERSE_RATE);
             let mut found: Vec<(f64, f64)> =
                 found.into_iter().map(|(_, n, scaling)| (n, scaling)).filter(|f| *f != anisodamping).collect();
-            if bench.rate_varies() && scalings.contains(&harmonic_n::scaling::DIRECTION) {
+            if dataset.rate_varies() && scalings.contains(&harmonic_n::scaling::DIRECTION) {
                 // a step between the directions is not seen in the angle's harmonics
                 found.insert(0, (0.0, harmonic_n::scaling::DIRECTION));
             }
@@ -130,7 +130,8 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
             let mut found: Vec<(f64, f64)> = lines.iter().take(2).map(|(n, _)| (f64::from(*n), 0.0)).collect();
             // At one rate a broken order of the table is a line in time.
             let strongest = lines.first().map_or(0.0, |l| l.1);
-            let line = bench.speeds_differ().then(|| strongest_line(residual, Along::Table, 2.0 * strongest)).flatten();
+            let line =
+                dataset.speeds_differ().then(|| strongest_line(residual, Along::Table, 2.0 * strongest)).flatten();
             let broken = line.filter(|(order, _)| {
                 *order > 0.5 && *order < f64::from(most) && (order - order.round()).abs() > BROKEN_ORDER
             });
@@ -140,7 +141,7 @@ fn proposals(bench: &Bench, residual: &Evaluation, dense: &Evaluation, over: Sea
         Search::Frequency => {
             let samples: usize = dense.segments.iter().map(|s| s.samples).max().unwrap_or(1);
             // At one rate a line in time is also one in angle: nothing tells which, and a gyroscope has causes for both.
-            let told = bench.speeds_differ() || bench.instrument == Instrument::Sensor;
+            let told = dataset.speeds_differ() || dataset.instrument == Instrument::Sensor;
             let least = LINE_OVER_DRIFT * drift_power(dense);
             let found = told.then(|| strongest_line(dense, Along::Time, least)).flatten();
             (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
@@ -154,21 +155,21 @@ const BROKEN_ORDER: f64 = 0.02;
 const LINE_OVER_DRIFT: f64 = 1.5;
 
 /// How a harmonic may scale, as far as the fitted runs can tell.
-fn scalings(bench: &Bench) -> Vec<f64> {
+fn scalings(dataset: &Dataset) -> Vec<f64> {
     use harmonic_n::scaling::{CONSTANT, DIRECTION, INVERSE_RATE, RATE};
     let mut all = vec![CONSTANT];
-    if bench.both_directions() {
+    if dataset.both_directions() {
         all.push(DIRECTION);
     }
-    if bench.speeds_differ() {
+    if dataset.speeds_differ() {
         all.extend([RATE, INVERSE_RATE]);
     }
     all
 }
 
 /// The largest in-phase readout of any channel, V, spikes aside.
-fn largest_component(bench: &Bench) -> f64 {
-    let mut sizes: Vec<f64> = bench
+fn largest_component(dataset: &Dataset) -> f64 {
+    let mut sizes: Vec<f64> = dataset
         .tracks
         .iter()
         .flat_map(|t| {

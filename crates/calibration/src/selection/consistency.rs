@@ -8,7 +8,7 @@ use cvg_model::effects::EffectId;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
 use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::Bench;
+use crate::estimation::joint_fit::Dataset;
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
@@ -39,11 +39,11 @@ struct Contribution {
 }
 
 impl Contribution {
-    fn new(bench: &Bench, fit: &Fit, member: usize, role: Role) -> Self {
-        let with = evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole, None);
+    fn new(dataset: &Dataset, fit: &Fit, member: usize, role: Role) -> Self {
+        let with = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole, None);
         let mut reduced = fit.hypothesis.clone();
         reduced.members.remove(member);
-        let mut change = evaluate(&bench.tracks, &reduced, &fit.starts, role, Window::Whole, Some(&with));
+        let mut change = evaluate(&dataset.tracks, &reduced, &fit.starts, role, Window::Whole, Some(&with));
         for (without, with) in change.segments.iter_mut().zip(&with.segments) {
             for (a, b) in without.angle.iter_mut().zip(&with.angle) {
                 *a -= b;
@@ -52,7 +52,7 @@ impl Contribution {
         Self { with, change }
     }
 
-    fn shares(&self, bench: &Bench) -> Vec<Share> {
+    fn shares(&self, dataset: &Dataset) -> Vec<Share> {
         let count = self.with.errors().count();
         let cost = inflation(&autocorrelation(&self.with, WHITENESS_LAGS), count);
         self.with
@@ -69,7 +69,7 @@ impl Contribution {
                     n += 1.0;
                 }
                 Share {
-                    run: bench.tracks[with.track].track.name.clone(),
+                    run: dataset.tracks[with.track].track.name.clone(),
                     value: if power > 0.0 { 1.0 + left / power } else { 1.0 },
                     deviation: if power > 0.0 { (squares / n * cost / power).sqrt() } else { f64::INFINITY },
                 }
@@ -93,14 +93,14 @@ impl Contribution {
 }
 
 /// Why member `member` cannot be claimed as a cause, if the runs contradict it.
-pub(crate) fn doubt(bench: &Bench, fit: &Fit, member: usize) -> Option<String> {
+pub(crate) fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> {
     for role in [Role::Fit, Role::Holdout] {
-        let contribution = Contribution::new(bench, fit, member, role);
+        let contribution = Contribution::new(dataset, fit, member, role);
         if role == Role::Holdout && contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {
             return Some("it does too little on held-out data to be recognised".into());
         }
         let contradicting = contribution
-            .shares(bench)
+            .shares(dataset)
             .into_iter()
             .find(|s| (s.value - 1.0).abs() > TOLERATED_SHARE + TOLERATED_DEVIATIONS * s.deviation);
         if let Some(s) = contradicting {
@@ -113,7 +113,7 @@ pub(crate) fn doubt(bench: &Bench, fit: &Fit, member: usize) -> Option<String> {
                 && harmonic.is_some_and(|n| (m.values[0] - f64::from(n)).abs() < 0.5)
         });
         if let Some((other, m)) = beside {
-            let size = Contribution::new(bench, fit, other, role).rms();
+            let size = Contribution::new(dataset, fit, other, role).rms();
             if size > SHARED_HARMONIC * contribution.rms() {
                 return Some(format!("another part of harmonic {} has no known cause", m.values[0]));
             }

@@ -13,12 +13,12 @@ use crate::diagnostics::residual::{Harmonic, WHITENESS_LAGS, autocorrelation, in
 use crate::error::Refusal;
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, fit};
-use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
+use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
-use crate::selection::consistency::doubt;
+use crate::selection::consistency::inconsistency;
 
 /// Gain in log-likelihood (×2, after the price of parameters and of the search) that a new effect must bring.
 pub const LEAST_GAIN: f64 = 12.0;
@@ -32,7 +32,7 @@ pub const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
 /// A cause under which the energy balance leaves this many times the mean square is refuted.
 pub const REFUTED: f64 = 1.5;
 /// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
-pub const WITNESSED: f64 = 0.8;
+pub const BY_AMPLITUDE: f64 = 0.8;
 /// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
 const NOTHING_LEFT: f64 = 1.2;
 /// Most effects that are added.
@@ -75,7 +75,7 @@ pub struct Step {
     /// rms of what the energy balance leaves of ln a, before and after; where amplitude and commands were recorded
     pub energy_balance: Option<[f64; 2]>,
     /// why a cause of the library is not claimed
-    pub doubt: Option<String>,
+    pub inconsistency: Option<String>,
     /// the energy balance contradicts it, or a cause that explains the angle as well
     pub contradicted: bool,
 }
@@ -89,25 +89,25 @@ const CAREFUL: Effort = Effort { steps: 6, thinned: 6_000, polish: false };
 /// # Errors
 /// As for the fit.
 pub(crate) fn discover(
-    bench: &mut Bench,
+    dataset: &mut Dataset,
     mut fitted: Fitted,
     progress: &dyn Fn(&str),
 ) -> Result<(Fitted, Vec<Step>), Refusal> {
     let mut steps: Vec<Step> = Vec::new();
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
-        let Some((next, step)) = best_step(bench, &fitted)? else {
+        let Some((next, step)) = best_step(dataset, &fitted)? else {
             // trials leave the runs as their own fits had them
-            if bench.disturbed(&fitted.fit) {
-                fitted = fit_with_ring_downs(bench, &fitted.fit.hypothesis)?;
+            if dataset.disturbed(&fitted.fit) {
+                fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
             }
             break;
         };
         fitted = next;
         steps.push(step);
     }
-    drop_weak(bench, &mut fitted, &mut steps)?;
-    question(bench, &mut fitted.fit, &mut steps);
+    drop_weak(dataset, &mut fitted, &mut steps)?;
+    check_run_consistency(dataset, &mut fitted.fit, &mut steps);
     Ok((fitted, steps))
 }
 
@@ -119,74 +119,74 @@ pub(crate) fn step_of(hypothesis: &Hypothesis, at: usize, steps: &[Step]) -> Opt
 }
 
 /// Asks every run for what was claimed: a cause that a run contradicts becomes an empirical description.
-fn question(bench: &Bench, fit: &mut Fit, steps: &mut [Step]) {
+fn check_run_consistency(dataset: &Dataset, fit: &mut Fit, steps: &mut [Step]) {
     for at in 0..fit.hypothesis.members.len() {
         let member = fit.hypothesis.members[at];
         if member.origin != Origin::Discovered {
             continue;
         }
         let Some(step) = step_of(&fit.hypothesis, at, steps).map(|i| &mut steps[i]) else { continue };
-        if let Some(doubt) = doubt(bench, fit, at) {
+        if let Some(inconsistency) = inconsistency(dataset, fit, at) {
             fit.hypothesis.members[at].origin = Origin::Empirical;
             step.origin = Origin::Empirical;
-            step.doubt = Some(doubt);
+            step.inconsistency = Some(inconsistency);
         }
     }
 }
 
 /// The best extension of a fitted hypothesis that earns its place.
-fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)>, Refusal> {
-    let before = evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Step)>, Refusal> {
+    let before = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
     let dense =
-        bench.tracks.iter().any(|p| p.track.stride > 1).then(|| {
-            evaluate(&bench.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
+        dataset.tracks.iter().any(|p| p.track.stride > 1).then(|| {
+            evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
         });
-    let candidates = candidates(bench, &fitted.fit.hypothesis, &before, dense.as_ref().unwrap_or(&before));
-    let base_quick = mean_square(&refit(bench, fitted, &fitted.fit.hypothesis, QUICK));
+    let candidates = candidates(dataset, &fitted.fit.hypothesis, &before, dense.as_ref().unwrap_or(&before));
+    let base_quick = mean_square(&refit(dataset, fitted, &fitted.fit.hypothesis, QUICK));
     let mut ranked: Vec<Trial> = candidates
         .into_par_iter()
         .filter_map(|candidate| {
-            let fit = refit(bench, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), QUICK);
+            let fit = refit(dataset, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), QUICK);
             let n = count(&fit);
             let gain = n * (base_quick / mean_square(&fit)).ln() - price(&candidate, n);
             gain.is_finite().then_some(Trial { candidate, fit, gain, balance: None, refuted: false })
         })
         .collect();
     ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    if bench.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.gain < 0.0) {
+    if dataset.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.gain < 0.0) {
         return Ok(None);
     }
-    let base = refit(bench, fitted, &fitted.fit.hypothesis, CAREFUL);
+    let base = refit(dataset, fitted, &fitted.fit.hypothesis, CAREFUL);
     ranked.truncate(FINALISTS);
     let mut trials: Vec<Trial> = ranked
         .into_par_iter()
-        .map(|quick| Trial { fit: refit(bench, fitted, &quick.fit.hypothesis, CAREFUL), ..quick })
+        .map(|quick| Trial { fit: refit(dataset, fitted, &quick.fit.hypothesis, CAREFUL), ..quick })
         .collect();
     let Some(best) = trials.iter().min_by(|a, b| mean_square(&a.fit).total_cmp(&mean_square(&b.fit))) else {
         return Ok(None);
     };
     // Autocorrelation that even the best candidate leaves makes samples worth less.
-    let after = evaluate(&bench.tracks, &best.fit.hypothesis, &best.fit.starts, Role::Fit, Window::Whole, None);
+    let after = evaluate(&dataset.tracks, &best.fit.hypothesis, &best.fit.starts, Role::Fit, Window::Whole, None);
     let worth = 1.0 / sample_cost(&after);
     for t in &mut trials {
         let n = worth * count(&t.fit);
         t.gain = n * (mean_square(&base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
     }
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let told = Told {
-        rates: bench.tracks_differ(),
-        speeds: bench.speeds_differ(),
-        mechanics: bench.tracks.iter().all(|t| t.track.has_commands() && t.track.has_quadrature()),
+    let apart = Distinguishable {
+        rates: dataset.tracks_differ(),
+        speeds: dataset.speeds_differ(),
+        mechanics: dataset.tracks.iter().all(|t| t.track.has_commands() && t.track.has_quadrature()),
     };
-    let balance_before = balance(bench, &base);
-    let heldout_before = heldout(bench, &fitted.fit);
-    let least_removed = (LEAST_SHARE_OF_FLOOR * floor(bench, &fitted.fit)).powi(2);
+    let balance_before = balance(dataset, &base);
+    let heldout_before = heldout(dataset, &fitted.fit);
+    let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, &fitted.fit)).powi(2);
     loop {
-        witness(bench, &mut trials, balance_before, told);
-        let Some((chosen, origin, confounded_with)) = choose(&trials, told) else { return Ok(None) };
+        amplitude_evidence(dataset, &mut trials, balance_before, apart);
+        let Some((chosen, origin, confounded_with)) = choose(&trials, apart) else { return Ok(None) };
         let chosen = chosen.clone();
-        let next = fit_with_ring_downs(bench, &extend_from(&chosen, origin))?;
-        let after = on_heldout(bench, &next.fit);
+        let next = fit_with_ring_downs(dataset, &extend_from(&chosen, origin))?;
+        let after = on_heldout(dataset, &next.fit);
         let heldout_after = after.mean_square();
         trials.retain(|t| t.candidate != chosen.candidate);
         if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before || heldout_before - heldout_after < least_removed
@@ -204,7 +204,7 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
             harmonics: pattern_harmonics(&after),
             confounded_with,
             energy_balance: balance_before.zip(chosen.balance).map(|(a, b)| [a.sqrt(), b.sqrt()]),
-            doubt: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
+            inconsistency: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
             contradicted: chosen.refuted || trials.iter().any(|t| t.refuted && t.gain > chosen.gain - LEAST_LEAD),
         };
         return Ok(Some((next, step)));
@@ -212,22 +212,22 @@ fn best_step(bench: &mut Bench, fitted: &Fitted) -> Result<Option<(Fitted, Step)
 }
 
 /// Mean square of what the energy balance leaves under a fit.
-fn balance(bench: &Bench, fit: &Fit) -> Option<f64> {
-    energy_balance(&bench.tracks, &fit.hypothesis, &fit.starts).map(|b| b.mean_square)
+fn balance(dataset: &Dataset, fit: &Fit) -> Option<f64> {
+    energy_balance(&dataset.tracks, &fit.hypothesis, &fit.starts).map(|b| b.mean_square)
 }
 
 /// Asks the energy balance about the trials that may be chosen, and at one rate about those they have to be told from.
-fn witness(bench: &Bench, trials: &mut [Trial], before: Option<f64>, tell: Told) {
+fn amplitude_evidence(dataset: &Dataset, trials: &mut [Trial], before: Option<f64>, apart: Distinguishable) {
     let least = trials.first().map_or(0.0, |t| t.gain - LEAST_LEAD);
-    for t in trials.iter_mut().filter(|t| t.balance.is_none() && (t.gain > least || !tell.rates)) {
-        t.balance = balance(bench, &t.fit);
+    for t in trials.iter_mut().filter(|t| t.balance.is_none() && (t.gain > least || !apart.rates)) {
+        t.balance = balance(dataset, &t.fit);
         t.refuted = before.zip(t.balance).is_some_and(|(before, after)| after > REFUTED * before);
     }
 }
 
 /// What the fitted runs can tell apart.
 #[derive(Debug, Clone, Copy)]
-struct Told {
+struct Distinguishable {
     /// runs at two or more rates, or in both directions
     rates: bool,
     /// at two or more speeds
@@ -237,22 +237,22 @@ struct Told {
 }
 
 /// The winner among refitted candidates, and in what capacity it comes in.
-fn choose(trials: &[Trial], tell: Told) -> Option<(&Trial, Origin, Vec<EffectId>)> {
+fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, Vec<EffectId>)> {
     let best = trials.first().filter(|t| t.gain >= LEAST_GAIN)?;
     let empirical = |t: &&Trial| {
         let d = t.candidate.id.description();
         // at one speed a delay is a step between the directions
-        let delayed = d.scaling.rate > 0 && !tell.speeds;
+        let delayed = d.scaling.rate > 0 && !apart.speeds;
         // without the loops' record what they do to the pattern looks like mechanics
-        let driven = d.stage == Stage::Mechanics && !tell.mechanics;
+        let driven = d.stage == Stage::Mechanics && !apart.mechanics;
         // and a line in time may be one of the table or of what turns with it
-        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !tell.speeds;
+        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !apart.speeds;
         t.refuted || !d.explains(&t.candidate.values) || delayed || driven || in_time
     };
     let described = trials.iter().find(empirical);
     let level = |t: &&Trial| !empirical(t) && t.gain >= best.gain - LEAST_LEAD && t.gain >= LEAST_GAIN;
     // of causes that explain the angle equally well, the one that closes the energy balance
-    let told_from = |t: &Trial, other: &Trial| t.balance.zip(other.balance).is_some_and(|(a, b)| a < WITNESSED * b);
+    let told_from = |t: &Trial, other: &Trial| t.balance.zip(other.balance).is_some_and(|(a, b)| a < BY_AMPLITUDE * b);
     let leader = trials.iter().find(level);
     let Some(library) = leader.map(|l| trials.iter().filter(level).find(|t| told_from(t, l)).unwrap_or(l)) else {
         return Some((best, Origin::Empirical, Vec::new()));
@@ -263,8 +263,8 @@ fn choose(trials: &[Trial], tell: Told) -> Option<(&Trial, Origin, Vec<EffectId>
         .filter(|t| !told_from(library, t))
         .collect();
     // At one rate only the energy balance tells a slow push on the pattern from a fault of the readout.
-    let witnessed = trials.iter().filter(|t| t.candidate != library.candidate).all(|t| told_from(library, t));
-    let told = tell.rates || witnessed || library.candidate.id.description().stage != Stage::Mechanics;
+    let by_amplitude = trials.iter().filter(|t| t.candidate != library.candidate).all(|t| told_from(library, t));
+    let told = apart.rates || by_amplitude || library.candidate.id.description().stage != Stage::Mechanics;
     let rivals: Vec<EffectId> = rivals.into_iter().map(|t| t.candidate.id).collect();
     if rivals.is_empty() && told {
         return Some((library, Origin::Discovered, rivals));
@@ -284,15 +284,15 @@ fn choose(trials: &[Trial], tell: Told) -> Option<(&Trial, Origin, Vec<EffectId>
 }
 
 /// Drops effects whose place the final data does not support.
-fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> Result<(), Refusal> {
+fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Step>) -> Result<(), Refusal> {
     if steps.len() < 2 {
         return Ok(());
     }
     loop {
-        let with = refit(bench, fitted, &fitted.fit.hypothesis, CAREFUL);
+        let with = refit(dataset, fitted, &fitted.fit.hypothesis, CAREFUL);
         let worth = 1.0
             / sample_cost(&evaluate(
-                &bench.tracks,
+                &dataset.tracks,
                 &fitted.fit.hypothesis,
                 &fitted.fit.starts,
                 Role::Fit,
@@ -305,7 +305,7 @@ fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> R
             .map(|i| {
                 let mut reduced = fitted.fit.hypothesis.clone();
                 let member = reduced.members.remove(i);
-                let without = refit(bench, fitted, &reduced, CAREFUL);
+                let without = refit(dataset, fitted, &reduced, CAREFUL);
                 let parameters = member.id.description().parameters.len() as f64;
                 (n * (mean_square(&without) / mean_square(&with)).ln() - parameters * n.ln(), i)
             })
@@ -315,11 +315,11 @@ fn drop_weak(bench: &mut Bench, fitted: &mut Fitted, steps: &mut Vec<Step>) -> R
                 let step = step_of(&fitted.fit.hypothesis, i, steps);
                 let mut reduced = fitted.fit.hypothesis.clone();
                 reduced.members.remove(i);
-                let before = heldout(bench, &fitted.fit);
-                let without = fit_with_ring_downs(bench, &reduced)?;
-                if (1.0 - LEAST_HELDOUT_GAIN) * heldout(bench, &without.fit) > before {
+                let before = heldout(dataset, &fitted.fit);
+                let without = fit_with_ring_downs(dataset, &reduced)?;
+                if (1.0 - LEAST_HELDOUT_GAIN) * heldout(dataset, &without.fit) > before {
                     // weak by itself, but the data that was not fitted asks for it
-                    *fitted = fit_with_ring_downs(bench, &fitted.fit.hypothesis)?;
+                    *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
                     return Ok(());
                 }
                 *fitted = without;
@@ -357,10 +357,10 @@ fn extend_from(trial: &Trial, origin: Origin) -> Hypothesis {
     extended
 }
 
-fn refit(bench: &Bench, fitted: &Fitted, hypothesis: &Hypothesis, effort: Effort) -> Fit {
-    let unknowns: Vec<Unknown> = bench.unknowns(hypothesis);
-    let priors = bench.priors(hypothesis, fitted.drive.as_ref());
-    fit(&bench.tracks, hypothesis, &unknowns, &priors, Role::Fit, effort)
+fn refit(dataset: &Dataset, fitted: &Fitted, hypothesis: &Hypothesis, effort: Effort) -> Fit {
+    let unknowns: Vec<Unknown> = dataset.unknowns(hypothesis);
+    let priors = dataset.priors(hypothesis, fitted.drive.as_ref());
+    fit(&dataset.tracks, hypothesis, &unknowns, &priors, Role::Fit, effort)
 }
 
 fn count(fit: &Fit) -> f64 {
@@ -391,16 +391,16 @@ fn sample_cost(evaluation: &Evaluation) -> f64 {
 }
 
 /// White part of the held-out error, rad.
-fn floor(bench: &Bench, fit: &Fit) -> f64 {
-    evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
+fn floor(dataset: &Dataset, fit: &Fit) -> f64 {
+    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
 }
 
 /// A fit on the held-out data.
-fn on_heldout(bench: &Bench, fit: &Fit) -> Evaluation {
-    evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None)
+fn on_heldout(dataset: &Dataset, fit: &Fit) -> Evaluation {
+    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None)
 }
 
 /// Held-out mean square of a fit, rad².
-fn heldout(bench: &Bench, fit: &Fit) -> f64 {
-    on_heldout(bench, fit).mean_square()
+fn heldout(dataset: &Dataset, fit: &Fit) -> f64 {
+    on_heldout(dataset, fit).mean_square()
 }

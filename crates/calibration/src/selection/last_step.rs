@@ -7,7 +7,7 @@ use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
 use crate::estimation::fit::{Fit, block_covariance, scaled_inverse};
 use crate::estimation::generalised_least_squares::{Refined, refine};
-use crate::estimation::joint_fit::{Bench, Fitted, fit_with_ring_downs};
+use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::{Instrument, Role};
@@ -24,46 +24,46 @@ const WORSE: f64 = 1.1;
 /// # Errors
 /// As for the fit.
 pub(crate) fn last_step(
-    bench: &mut Bench,
+    dataset: &mut Dataset,
     fitted: &mut Fitted,
     steps: &mut Vec<Step>,
 ) -> Result<DMatrix<f64>, Refusal> {
-    if bench.instrument == Instrument::Sensor {
+    if dataset.instrument == Instrument::Sensor {
         // the amplitude is part of a sensor's fit
-        return Ok(of_blocks(bench, &fitted.fit));
+        return Ok(of_blocks(dataset, &fitted.fit));
     }
     loop {
-        let Some(refined) = refined(bench, fitted) else {
-            return Ok(of_blocks(bench, &fitted.fit));
+        let Some(refined) = refined(dataset, fitted) else {
+            return Ok(of_blocks(dataset, &fitted.fit));
         };
         let Some((member, step)) = insignificant(&refined, steps) else {
-            let covariance = settled(bench, fitted, refined);
+            let covariance = settled(dataset, fitted, refined);
             return Ok(doubted(&fitted.fit, steps, covariance));
         };
         let mut reduced = fitted.fit.hypothesis.clone();
         reduced.members.remove(member);
         steps.remove(step);
-        *fitted = fit_with_ring_downs(bench, &reduced)?;
+        *fitted = fit_with_ring_downs(dataset, &reduced)?;
     }
 }
 
 /// The last step, with what the commands do adjusted where the runs tell it. White weights hold the drive where much is
 /// left, lest that drag it along; where it is only noise, and the runs agree, there is nothing to drag.
-fn refined(bench: &mut Bench, fitted: &Fitted) -> Option<Refined> {
-    let held = bench.drive_is_free;
-    let step = |bench: &Bench| {
-        let unknowns = bench.unknowns(&fitted.fit.hypothesis);
-        let priors = bench.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
-        refine(&bench.tracks, &Fit { unknowns, ..fitted.fit.clone() }, &priors)
+fn refined(dataset: &mut Dataset, fitted: &Fitted) -> Option<Refined> {
+    let held = dataset.drive_is_free;
+    let step = |dataset: &Dataset| {
+        let unknowns = dataset.unknowns(&fitted.fit.hypothesis);
+        let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
+        refine(&dataset.tracks, &Fit { unknowns, ..fitted.fit.clone() }, &priors)
     };
-    if !held && bench.tracks_differ() {
-        bench.drive_is_free = true;
-        if let Some(freed) = step(bench).filter(|r| r.disagreement == 1.0) {
+    if !held && dataset.tracks_differ() {
+        dataset.drive_is_free = true;
+        if let Some(freed) = step(dataset).filter(|r| r.disagreement == 1.0) {
             return Some(freed);
         }
     }
-    bench.drive_is_free = held;
-    step(bench)
+    dataset.drive_is_free = held;
+    step(dataset)
 }
 
 /// The least significant member that discovery added, and its step, where coloured noise and the runs' disagreement
@@ -106,9 +106,9 @@ fn significance(refined: &Refined, at: usize) -> Option<f64> {
 
 /// Makes the last step, unless held-back data speak against it: then the estimate stays, and by how much it would have
 /// moved counts as its error (Hausman 1978).
-fn settled(bench: &Bench, fitted: &mut Fitted, refined: Refined) -> DMatrix<f64> {
+fn settled(dataset: &Dataset, fitted: &mut Fitted, refined: Refined) -> DMatrix<f64> {
     let left = |fit: &Fit| {
-        evaluate(&bench.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None).mean_square()
+        evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None).mean_square()
     };
     let Refined { fit, mut covariance, .. } = refined;
     if left(&fit) <= WORSE * left(&fitted.fit) {
@@ -154,12 +154,12 @@ fn doubted(fit: &Fit, steps: &[Step], mut covariance: DMatrix<f64>) -> DMatrix<f
 
 /// Covariance without a last step: the larger of that of white residuals and of the block covariance, which allows for
 /// their memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
-fn of_blocks(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
+fn of_blocks(dataset: &Dataset, fit: &Fit) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
     let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
     // what considered unknowns could be does not depend on what is left
-    let plain = &fit.by_noise * (scale * undescribed(bench, fit) - 1.0) + &fit.covariance;
-    let blocks = block_covariance(&bench.tracks, fit, Role::Fit);
+    let plain = &fit.by_noise * (scale * undescribed(dataset, fit) - 1.0) + &fit.covariance;
+    let blocks = block_covariance(&dataset.tracks, fit, Role::Fit);
     let n = fit.unknowns.len();
     // raise each deviation to the larger of the two and keep the correlations
     let raise: Vec<f64> =
@@ -169,14 +169,14 @@ fn of_blocks(bench: &Bench, fit: &Fit) -> DMatrix<f64> {
 
 /// By what factor the mean square would be larger without empirical corrections, where the model is known to lack what
 /// the loops do; 1 elsewhere.
-fn undescribed(bench: &Bench, fit: &Fit) -> f64 {
+fn undescribed(dataset: &Dataset, fit: &Fit) -> f64 {
     let mut explained: Hypothesis = fit.hypothesis.clone();
     explained.members.retain(|m| m.origin != Origin::Empirical);
-    if explained == fit.hypothesis || !bench.tracks.iter().any(|t| t.drifts) {
+    if explained == fit.hypothesis || !dataset.tracks.iter().any(|t| t.drifts) {
         return 1.0;
     }
     let mean_square = |hypothesis: &Hypothesis| {
-        evaluate(&bench.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
+        evaluate(&dataset.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
     };
     (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
 }

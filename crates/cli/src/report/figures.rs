@@ -1,6 +1,6 @@
 //! The figures of the page, as Plotly takes them. Colours are names that the page turns into those of its theme.
 
-use cvg_calibration::picture::{EffectSizes, Picture};
+use cvg_calibration::plots::{EffectSizes, PlotData};
 use cvg_calibration::{BiasCurve, Identification};
 use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
@@ -48,17 +48,17 @@ const INKS: [&str; 7] = ["@declared", "@raw", "@discovered", "@4", "@5", "@6", "
 /// Every figure that the identification has the data for.
 pub(super) fn all(identified: &Identification) -> Vec<Figure> {
     let mut out = vec![bias(identified)];
-    let empty = Picture::default();
-    let picture = identified.picture.as_ref().unwrap_or(&empty);
-    out.extend(angle(picture));
+    let empty = PlotData::default();
+    let plots = identified.plots.as_ref().unwrap_or(&empty);
+    out.extend(angle(plots));
     out.extend(ring_downs(identified));
-    out.extend(drive(picture));
-    out.extend(harmonics(picture));
-    out.extend(picture.scaling.iter().filter_map(scaling));
-    out.extend(residual(picture));
-    out.extend(memory(picture));
-    out.extend(histogram(picture));
-    out.extend(correlations(picture));
+    out.extend(drive(plots));
+    out.extend(harmonics(plots));
+    out.extend(plots.scaling.iter().filter_map(scaling));
+    out.extend(residual(plots));
+    out.extend(memory(plots));
+    out.extend(histogram(plots));
+    out.extend(correlations(plots));
     out
 }
 
@@ -119,8 +119,8 @@ fn bias(identified: &Identification) -> Figure {
     Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
 }
 
-fn angle(picture: &Picture) -> Option<Figure> {
-    let curve = picture.angles.first()?;
+fn angle(plots: &PlotData) -> Option<Figure> {
+    let curve = plots.angles.first()?;
     let t = shorts(curve.t_s.iter().copied());
     let line = |name: &str, y: &[f64], axis: &str, ink: &str| {
         json!({"type": "scatter", "mode": "lines", "name": name, "x": t, "y": shorts(y.iter().copied()),
@@ -161,9 +161,9 @@ fn ring_downs(identified: &Identification) -> Option<Figure> {
     Some(Figure::new("ringdowns", "Ring-downs", caption, traces.collect(), layout))
 }
 
-fn drive(picture: &Picture) -> Option<Figure> {
+fn drive(plots: &PlotData) -> Option<Figure> {
     // the fastest run, the slowest, and those between
-    let mut drives: Vec<_> = picture.drives.iter().collect();
+    let mut drives: Vec<_> = plots.drives.iter().collect();
     drives.sort_by(|a, b| b.rate_dps.abs().total_cmp(&a.rate_dps.abs()));
     let last = drives.len().checked_sub(1)?;
     let mut shown: Vec<usize> = [0, last, last / 2].into_iter().take(DRIVES).collect();
@@ -188,9 +188,9 @@ fn drive(picture: &Picture) -> Option<Figure> {
     Some(Figure::new("drive", "Energy control over the pattern angle", caption, traces, layout).wide())
 }
 
-fn harmonics(picture: &Picture) -> Option<Figure> {
-    let any = picture.stages.iter().any(|(_, h)| !h.is_empty());
-    let traces = picture.stages.iter().map(|(name, list)| {
+fn harmonics(plots: &PlotData) -> Option<Figure> {
+    let any = plots.stages.iter().any(|(_, h)| !h.is_empty());
+    let traces = plots.stages.iter().map(|(name, list)| {
         json!({
             "type": "bar", "name": name, "marker": {"color": format!("@{name}")},
             "x": list.iter().map(|h| format!("{}θ", h.n)).collect::<Vec<_>>(),
@@ -208,8 +208,8 @@ fn harmonics(picture: &Picture) -> Option<Figure> {
     any.then(|| Figure::new("harmonics", "Harmonics", caption, traces.collect(), layout))
 }
 
-fn residual(picture: &Picture) -> Option<Figure> {
-    let traces: Vec<Value> = picture
+fn residual(plots: &PlotData) -> Option<Figure> {
+    let traces: Vec<Value> = plots
         .residuals
         .iter()
         .zip(INKS.iter().cycle())
@@ -227,8 +227,8 @@ fn residual(picture: &Picture) -> Option<Figure> {
     (!traces.is_empty()).then(|| Figure::new("residual", "Residual over time", caption, traces, layout).wide())
 }
 
-fn memory(picture: &Picture) -> Option<Figure> {
-    let m = &picture.memory;
+fn memory(plots: &PlotData) -> Option<Figure> {
+    let m = &plots.memory;
     let lags: Vec<usize> = (1..m.correlation.len()).collect();
     if lags.is_empty() {
         return None;
@@ -248,8 +248,8 @@ fn memory(picture: &Picture) -> Option<Figure> {
     Some(Figure::new("autocorrelation", "Autocorrelation", caption, traces, layout))
 }
 
-fn histogram(picture: &Picture) -> Option<Figure> {
-    let h = &picture.histogram;
+fn histogram(plots: &PlotData) -> Option<Figure> {
+    let h = &plots.histogram;
     if h.count.is_empty() {
         return None;
     }
@@ -268,7 +268,7 @@ fn histogram(picture: &Picture) -> Option<Figure> {
 /// Size of one effect over rate and over amplitude, each reduced by its own law to the other's middle.
 fn scaling(sizes: &EffectSizes) -> Option<Figure> {
     let runs = &sizes.runs;
-    let middle = |of: fn(&cvg_calibration::picture::EffectSize) -> f64| {
+    let middle = |of: fn(&cvg_calibration::plots::EffectSize) -> f64| {
         let logs: Vec<f64> = runs.iter().map(of).filter(|v| *v > 0.0).map(f64::ln).collect();
         (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
     };
@@ -278,7 +278,7 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
     let (p, q) = (i32::from(sizes.scaling.rate), i32::from(sizes.scaling.amplitude));
     let mut traces = Vec::new();
     let names: Vec<String> = runs.iter().map(|r| run_name(&r.name)).collect();
-    type Of = Box<dyn Fn(&cvg_calibration::picture::EffectSize) -> f64>;
+    type Of = Box<dyn Fn(&cvg_calibration::plots::EffectSize) -> f64>;
     let panels: [(&str, Of, Of, i32, f64); 2] = [
         ("", Box::new(|r| r.rate_dps.abs()), Box::new(move |r| (r.amplitude_v / amplitude_0).powi(-q)), p, rate_0),
         ("2", Box::new(|r| r.amplitude_v), Box::new(move |r| (r.rate_dps.abs() / rate_0).powi(-p)), q, amplitude_0),
@@ -336,8 +336,8 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
         .then(|| Figure::new(&format!("scaling-{id}"), &format!("Scaling of {id}"), caption, traces, layout))
 }
 
-fn correlations(picture: &Picture) -> Option<Figure> {
-    let c = &picture.correlations;
+fn correlations(plots: &PlotData) -> Option<Figure> {
+    let c = &plots.correlations;
     if c.names.len() < 2 {
         return None;
     }

@@ -73,7 +73,7 @@ fn parameters(h: &mut String, identified: &Identification) {
             row(h, &[&name, &value, &ends, &escape(&p.unit)]);
         }
     });
-    let Some(c) = identified.picture.as_ref().map(|p| &p.correlations) else { return };
+    let Some(c) = identified.plots.as_ref().map(|p| &p.correlations) else { return };
     let mut strong: Vec<(f64, &str, &str)> = Vec::new();
     for i in 0..c.names.len() {
         strong.extend((0..i).map(|j| (c.rows[i][j], c.names[j].as_str(), c.names[i].as_str())));

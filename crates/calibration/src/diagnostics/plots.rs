@@ -10,8 +10,8 @@ use crate::diagnostics::residual::{
     Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band,
 };
 use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::Bench;
-use crate::estimation::propagation::{Pace, Start, walk};
+use crate::estimation::joint_fit::Dataset;
+use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::statistics::{circular_mean, line};
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::model::prediction::{Predictor, Vibration};
@@ -20,7 +20,7 @@ use crate::recording::{Instrument, Role};
 
 /// Curves for the figures of a report.
 #[derive(Debug, Clone, Default)]
-pub struct Picture {
+pub struct PlotData {
     /// pattern angle over time, as recorded
     pub angles: Vec<AngleCurve>,
     /// energy control output over the pattern angle
@@ -133,9 +133,9 @@ pub struct Correlations {
     pub rows: Vec<Vec<f64>>,
 }
 
-/// What a picture is taken of.
-pub(crate) struct Scene<'a> {
-    pub(crate) bench: &'a Bench,
+/// What a plots is taken of.
+pub(crate) struct PlotContext<'a> {
+    pub(crate) dataset: &'a Dataset,
     pub(crate) fit: &'a Fit,
     pub(crate) covariance: &'a DMatrix<f64>,
     pub(crate) raw: Option<&'a Evaluation>,
@@ -164,26 +164,26 @@ const FAR_OFF_RAD: f64 = 0.05;
 const HISTOGRAM_BINS: usize = 61;
 const HISTOGRAM_DEVIATIONS: f64 = 5.0;
 
-/// A picture of errors alone: what instruments without mechanics have.
-pub(crate) fn picture_of(
+/// A plots of errors alone: what instruments without mechanics have.
+pub(crate) fn plots_of(
     names: &[String],
     raw: Option<&Evaluation>,
     declared: &Evaluation,
     discovered: &Evaluation,
     hypothesis: &Hypothesis,
-) -> Picture {
+) -> PlotData {
     // segments stand in the order of the names
     let name = |track: usize| {
         let at = discovered.segments.iter().position(|s| s.track == track);
         at.and_then(|at| names.get(at)).cloned().unwrap_or_default()
     };
-    Picture {
+    PlotData {
         angles: angles(raw.unwrap_or(discovered), hypothesis, name),
         stages: harmonics_of_stages(raw, declared, discovered),
         residuals: residuals(discovered, name),
         memory: memory(discovered),
         histogram: histogram(discovered),
-        ..Picture::default()
+        ..PlotData::default()
     }
 }
 
@@ -273,9 +273,9 @@ fn histogram(e: &Evaluation) -> Histogram {
     Histogram { middle_deg, count, normal }
 }
 
-impl Scene<'_> {
-    pub(crate) fn picture(&self) -> Picture {
-        Picture {
+impl PlotContext<'_> {
+    pub(crate) fn plots(&self) -> PlotData {
+        PlotData {
             angles: angles(self.raw.unwrap_or(self.discovered), self.hypothesis(), |track| self.name(track)),
             drives: self.drives(),
             stages: harmonics_of_stages(self.raw, self.declared, self.discovered),
@@ -292,19 +292,19 @@ impl Scene<'_> {
     }
 
     fn name(&self, track: usize) -> String {
-        self.bench.tracks[track].track.name.clone()
+        self.dataset.tracks[track].track.name.clone()
     }
 
     /// Runs with commands that fill every bin of the pattern angle.
     fn drives(&self) -> Vec<DriveCurve> {
-        if self.bench.instrument != Instrument::Gyroscope {
+        if self.dataset.instrument != Instrument::Gyroscope {
             return Vec::new();
         }
-        (0..self.bench.tracks.len()).filter_map(|track| self.drive(track)).collect()
+        (0..self.dataset.tracks.len()).filter_map(|track| self.drive(track)).collect()
     }
 
     fn drive(&self, number: usize) -> Option<DriveCurve> {
-        let track = &self.bench.tracks[number].track;
+        let track = &self.dataset.tracks[number].track;
         if !track.has_commands() {
             return None;
         }
@@ -360,7 +360,7 @@ impl Scene<'_> {
     fn sizes(&self, at: usize) -> EffectSizes {
         let mut without = self.hypothesis().clone();
         let id = without.members.remove(at).id;
-        let mut shares = vec![Share::default(); self.bench.tracks.len()];
+        let mut shares = vec![Share::default(); self.dataset.tracks.len()];
         for (role, with) in [(Role::Fit, self.on_fit), (Role::Holdout, self.discovered)] {
             for ((s, bare), kept) in with.segments.iter().zip(self.errors_of(&without, role, with)).zip(&with.kept) {
                 for i in (0..s.angle.len().min(bare.len())).filter(|&i| kept[i]) {
@@ -370,7 +370,7 @@ impl Scene<'_> {
         }
         let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         let runs = shares.iter().enumerate().filter(|(_, s)| s.count > 0.0 && s.dd > 0.0).map(|(number, s)| {
-            let track = &self.bench.tracks[number].track;
+            let track = &self.dataset.tracks[number].track;
             let fitted = (s.dd / s.count).sqrt();
             let deviation = (s.ee / s.count * inflated / s.dd).sqrt();
             EffectSize {
@@ -389,23 +389,23 @@ impl Scene<'_> {
     fn errors_of(&self, hypothesis: &Hypothesis, role: Role, like: &Evaluation) -> Vec<Vec<f64>> {
         let none = Unknowns::new(hypothesis, Vec::new());
         let mut out = Vec::new();
-        for (prepared, starts) in self.bench.tracks.iter().zip(&self.fit.starts) {
+        for (prepared, starts) in self.dataset.tracks.iter().zip(&self.fit.starts) {
             let track = &prepared.track;
             for (segment, start) in track.segments.iter().zip(starts).filter(|(s, _)| s.role == role) {
                 let Some(kept) = like.kept.get(out.len()) else { return out };
-                let walked = |start: Start, pace: Pace| {
+                let propagated = |start: Start, stepping: Stepping| {
                     let (mut turned, mut angle) = (Vec::new(), Vec::new());
-                    walk(track, segment, hypothesis, &none, start, pace, |row| {
+                    propagate(track, segment, hypothesis, &none, start, stepping, |row| {
                         turned.push(row.turned);
                         angle.push(row.angle);
                     });
                     (turned, angle)
                 };
-                let coarse = Pace::every(track.stride * (segment.range.len() / (track.stride * 500)).max(1));
+                let coarse = Stepping::every(track.stride * (segment.range.len() / (track.stride * 500)).max(1));
                 let middle = |angle: Vec<f64>| circular_mean(angle.into_iter(), hypothesis.period_rad);
                 let mut start = *start;
-                start.angle += middle(walked(start, coarse).1);
-                let (turned, mut angle) = walked(start, Pace { stride: track.stride, spike: FAR_OFF_RAD });
+                start.angle += middle(propagated(start, coarse).1);
+                let (turned, mut angle) = propagated(start, Stepping { stride: track.stride, spike: FAR_OFF_RAD });
                 let centre = middle(angle.clone());
                 for a in &mut angle {
                     *a = wrapped(*a - centre, hypothesis.period_rad);
