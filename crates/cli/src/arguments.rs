@@ -172,6 +172,22 @@ pub(crate) enum Command {
         #[arg(long, value_name = "LIMITS")]
         limits: Option<PathBuf>,
     },
+    /// Identify many devices in one call: a row for each, and what is odd or shared among them
+    Fleet {
+        /// Campaigns, folders with one or of such folders; patterns like 'devices/*/campaign.toml'
+        #[arg(required = true, value_name = "CAMPAIGN")]
+        campaigns: Vec<PathBuf>,
+        /// Folder for fleet.csv, fleet.json and a folder of results for each device; answers there that rest on the same
+        /// files are kept
+        #[arg(long)]
+        out: PathBuf,
+        /// Limits of numbers of each report (TOML); exit status 1 where a device fails one
+        #[arg(long, value_name = "LIMITS")]
+        limits: Option<PathBuf>,
+        /// Print fleet.json and nothing else to standard output
+        #[arg(long)]
+        json: bool,
+    },
     /// Say which parameters of two answers moved beyond their combined 95 % intervals
     #[command(after_help = COMPARE)]
     Compare {

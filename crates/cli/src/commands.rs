@@ -91,7 +91,7 @@ pub(crate) fn identify(
 }
 
 /// An answer as it is handed out.
-struct Told {
+pub(crate) struct Told {
     device: String,
     json: String,
     page: String,
@@ -102,19 +102,31 @@ struct Told {
 }
 
 impl Told {
+    /// report.json and, where something is undone, calibration.toml.
+    pub(crate) fn facts(answer: &Answer) -> Result<(String, Option<String>), Failure> {
+        match answer {
+            Answer::Identified(identified) => Ok((report_json(identified)?, Some(identified.calibration.to_text()))),
+            Answer::Surveyed(surveyed) => {
+                let json = serde_json::to_string_pretty(&surveyed.report).map_err(Failure::input)?;
+                Ok((json, surveyed.calibration.as_ref().map(Calibration::to_text)))
+            }
+        }
+    }
+
     fn of(answer: &Answer) -> Result<Self, Failure> {
+        let (json, calibration) = Self::facts(answer)?;
         match answer {
             Answer::Identified(identified) => {
-                let [json, page, calibration] = results(identified)?;
+                let page = report::page(identified)?;
                 let reason = identified.report.reason.clone();
                 let device = identified.report.device.clone();
-                Ok(Self { device, json, page, calibration: Some(calibration), summary: summary(identified), reason })
+                Ok(Self { device, json, page, calibration, summary: summary(identified), reason })
             }
             Answer::Surveyed(surveyed) => Ok(Self {
                 device: surveyed.report.device.clone(),
-                json: serde_json::to_string_pretty(&surveyed.report).map_err(Failure::input)?,
                 page: report::survey::page(surveyed)?,
-                calibration: surveyed.calibration.as_ref().map(Calibration::to_text),
+                json,
+                calibration,
                 summary: report::survey::summary(&surveyed.report),
                 reason: surveyed.report.reason.clone(),
             }),

@@ -12,11 +12,11 @@ use crate::{Failure, output};
 
 /// A parameter of one answer.
 #[derive(Debug, Clone, PartialEq)]
-struct Parameter {
-    name: String,
-    unit: String,
-    value: f64,
-    ci95: Option<[f64; 2]>,
+pub(crate) struct Parameter {
+    pub(crate) name: String,
+    pub(crate) unit: String,
+    pub(crate) value: f64,
+    pub(crate) ci95: Option<[f64; 2]>,
 }
 
 /// A parameter of both answers, or of one.
@@ -72,7 +72,8 @@ fn parameters(path: &Path) -> Result<Vec<Parameter>, Failure> {
     Ok(of_report(&report))
 }
 
-fn of_report(report: &Value) -> Vec<Parameter> {
+/// The parameters of a report.
+pub(crate) fn of_report(report: &Value) -> Vec<Parameter> {
     let mut out: Vec<Parameter> = ESTIMATES
         .iter()
         .filter_map(|(at, unit)| parameter(at.trim_start_matches('/').replace('/', "."), unit, report.pointer(at)?))

@@ -11,6 +11,7 @@ mod compare;
 mod compensate;
 mod demo;
 mod figure;
+mod fleet;
 mod input;
 mod inspect;
 mod library;
@@ -79,6 +80,10 @@ fn run(command: Command) -> Result<(), Failure> {
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
             let wanted = input::Wanted { naming: &naming, holdout: &holdout, settle_s: settle, sensor };
             commands::identify(|| input::campaign(&campaign, &wanted), out.as_deref(), json, limits.as_ref())
+        }
+        Command::Fleet { campaigns, out, limits, json } => {
+            let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
+            fleet::fleet(&campaigns, &out, limits.as_ref(), json)
         }
         Command::Compare { a, b, json } => compare::compare(&a, &b, json),
         Command::Compensate { calibration, recordings, out, device, mapping } => {

@@ -148,11 +148,8 @@ fn at_rest(rows: u64, seed: u64, iq: bool) -> String {
         let t = i as f64 * 0.1;
         theta += WALK / 60.0 * 0.1f64.sqrt() * normal(i, seed) + 2.0 / 3600.0 * 0.1;
         let (sin, cos) = theta.to_radians().sin_cos();
-        let _ = if iq {
-            writeln!(text, "{t},{cos},0,{sin},0")
-        } else {
-            writeln!(text, "{t},{}", theta.rem_euclid(180.0))
-        };
+        let _ =
+            if iq { writeln!(text, "{t},{cos},0,{sin},0") } else { writeln!(text, "{t},{}", theta.rem_euclid(180.0)) };
     }
     text
 }

