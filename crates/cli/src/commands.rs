@@ -12,6 +12,7 @@ use cvg_simulator::{Scenario, ScenarioError};
 use crate::arguments::Arguments;
 use crate::limits::Limits;
 use crate::progress::Progress;
+use crate::report::further::{Number, further};
 use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
@@ -226,8 +227,8 @@ pub(crate) fn summary(identified: &Identification) -> String {
         let f = u.frequency_hz.map(|f| format!(" {f:.4} Hz")).unwrap_or_default();
         line(format!("  unexplained {}{n}{f}: {:.5}° rms; {}", u.class, u.rms_deg, u.suggestion));
     }
-    if let Some(allan) = &r.allan {
-        report::survey::allan_in_words(allan).into_iter().for_each(&mut line);
+    for Number { name, value, unit } in further(r) {
+        line(format!("  {name:<27} {} ± {:.1e} {unit}", significant(value.value), value.half_width()));
     }
     for w in &r.warnings {
         line(format!("  warning: {w}"));

@@ -131,6 +131,22 @@ fn anisoelasticity_is_a_sine_of_2_theta_in_the_quadrature_command() {
 }
 
 #[test]
+fn detection_phase_turns_the_pattern_through_a_split_at_4_theta() {
+    let axis = 20_f64.to_radians();
+    let split = r#"{ id = "anisoelasticity", anisoelasticity = 0.25, theta_omega = 20.0 }"#;
+    // slow enough for the loops to follow: a true quadrature alone gave twice as much, but the lock's phase goes with the
+    // pattern too, and turns half of it back through the force that holds the split
+    for rate in [10.0, -10.0, 5.0] {
+        let fourth = |effects: &str| angle_harmonics(&rotation(effects, rate, 120.0), &[2.0, 4.0])[1];
+        let lagging = fourth(&format!(r#"{split}, {{ id = "detection-phase", phase_difference = 0.02 }}"#));
+        let alone = fourth(split);
+        let expected = -0.25 * 0.02_f64.sin() / (32.0 * k_omega(rate));
+        close(lagging.cos - alone.cos, expected * (2.0 * axis).cos());
+        close(lagging.sin - alone.sin, expected * (2.0 * axis).sin());
+    }
+}
+
+#[test]
 fn spring_cubic_is_a_fourth_harmonic_that_shrinks_with_the_rate() {
     for rate in [500.0, 100.0, -100.0] {
         let run = rotation(r#"{ id = "spring-cubic", p = 0.02, phase = 30.0 }"#, rate, 20.0);

@@ -8,6 +8,7 @@ use cvg_calibration::report::{Estimate, Report};
 use super::escape;
 use super::figures::run_name;
 use super::finding::interval;
+use super::further::{Number, further};
 use crate::commands::significant;
 use crate::standard;
 
@@ -63,6 +64,10 @@ fn parameters(h: &mut String, identified: &Identification) {
         estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref());
         if r.instrument == "gyroscope" {
             estimate("actuation gain ratio G<sub>Ax</sub>/G<sub>Ay</sub>", r.actuation_gain_ratio.as_ref());
+        }
+        for Number { name, value, unit } in further(r) {
+            let [value, low, high] = interval(value.value, value.ci95);
+            row(h, &[name, &value, &format!("{low} … {high}"), unit]);
         }
         for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));

@@ -2,7 +2,8 @@
 //!
 //! The lag that both have in common is the phase-locked loop's to follow: it changes none of E, Q, R and S. The difference
 //! makes of a line orbit an ellipse, Q_d = E sin 2θ · sin φ, and the quadrature loop nulls that by a true quadrature of the
-//! opposite sign. With a split, it turns the pattern: θ̇ ∋ −¼Δω sin φ [sin(4θ − 2θ_ω) + sin 2θ_ω].
+//! opposite sign. With a split, that turns the pattern: θ̇ ∋ −¼Δω sin φ [sin(4θ − 2θ_ω) + sin 2θ_ω]. Where the phase lock is fast
+//! enough to follow 2θ, its phase goes by −½φ cos 2θ, and the force that holds the split turns half of the 4θ back.
 
 use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
@@ -21,7 +22,8 @@ impl Effect for DetectionPhase {
         parameters: &[fitted("phase_difference", "rad", 0.5, 1e-2)],
         onsets: &[],
         shown: &[Shown::Plain(0)],
-        signature: "angle Δω φ/(16kΩ) cos(4θ−2θ_ω) through a true Q = −E sin 2θ sin φ; v_qc at 2θ",
+        signature: "angle −Δω sin φ/(32kΩ) cos(4θ−2θ_ω), twice that where the phase lock is too slow for 2θ, through a true \
+                    Q = −E sin 2θ sin φ; v_qc at 2θ",
         scaling: Scaling { rate: -1, amplitude: 0, odd_in_rate: true },
         source: "phasors of two channels with unequal delay",
     };

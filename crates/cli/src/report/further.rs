@@ -1,0 +1,27 @@
+//! Numbers that only some campaigns tell: how the scale factor goes with the rate, how far an angle at rest wanders, how a
+//! vibration decays.
+
+use cvg_calibration::report::{Estimate, Report};
+
+/// A number with its unit.
+pub(crate) struct Number {
+    pub(crate) name: &'static str,
+    pub(crate) value: Estimate,
+    pub(crate) unit: &'static str,
+}
+
+/// Those of a report, in the order in which they are read.
+pub(crate) fn further(r: &Report) -> Vec<Number> {
+    let scale = r.scale_factor.iter().flat_map(|s| {
+        [("scale factor, nonlinearity", s.nonlinearity_ppm, "ppm"), ("scale factor, asymmetry", s.asymmetry_ppm, "ppm")]
+    });
+    let rest = r.allan.iter().flat_map(|a| {
+        let walk = a.angle_random_walk_deg_sqrt_h.map(|e| ("angle random walk", e, "deg/√h"));
+        walk.into_iter().chain([("bias instability", a.bias_instability_dph, "deg/h")])
+    });
+    let decay = r.decay.iter().flat_map(|d| {
+        let bend = d.frequency_per_energy.map(|e| ("frequency over energy dω/dE", e, "rad/s/V²"));
+        [("decay time constant τ", d.tau_s, "s"), ("precession", d.precession_dph, "deg/h")].into_iter().chain(bend)
+    });
+    scale.chain(rest).chain(decay).map(|(name, value, unit)| Number { name, value, unit }).collect()
+}
