@@ -38,10 +38,12 @@ pub(crate) fn candidates(
 ) -> Vec<Candidate> {
     let sensor = dataset.instrument == Instrument::Sensor;
     let commands = dataset.tracks.iter().any(|t| t.track.has_commands());
+    let loops = dataset.tracks.iter().any(|t| t.track.has_commands() && t.track.has_quadrature());
     let mut out = Vec::new();
     for &id in EffectId::ALL {
         let d = id.description();
-        if d.declared || (sensor && !d.in_sensors) || (d.stage == Stage::Actuation && !commands) {
+        let unseen = (d.stage == Stage::Actuation && !commands) || (id.seen_by_loops() && !loops);
+        if d.declared || unseen || (sensor && !d.in_sensors) {
             continue;
         }
         if d.scaling.rate > 0 && !dataset.rate_varies() {

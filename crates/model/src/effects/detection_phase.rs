@@ -12,6 +12,7 @@ use crate::{Envelope, Real};
 pub struct DetectionPhase;
 
 impl Effect for DetectionPhase {
+    const SEEN_BY_LOOPS: bool = true;
     const DESCRIPTION: Description = Description {
         id: "detection-phase",
         title: "unequal phase lag of the readout channels",

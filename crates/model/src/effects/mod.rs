@@ -208,6 +208,9 @@ pub trait Effect {
     /// It is told by the time of a recording's clock, which says nothing of another day.
     const IN_TIME: bool = false;
 
+    /// It is seen in what the loops answer to it: nothing tells it without the quadrature and the commands.
+    const SEEN_BY_LOOPS: bool = false;
+
     /// Input rate that reaches the resonator, rad/s, when the table turns at `rate_rad_s`.
     #[inline]
     fn input_rate<T: Real>(_: &Values<T>, rate_rad_s: T, _: &Moment<T>) -> T {
@@ -294,6 +297,11 @@ macro_rules! library {
             /// [`Effect::IN_TIME`]
             pub const fn in_time(self) -> bool {
                 match self { $(Self::$name => const { <$effect as Effect>::IN_TIME }),+ }
+            }
+
+            /// [`Effect::SEEN_BY_LOOPS`]
+            pub const fn seen_by_loops(self) -> bool {
+                match self { $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS }),+ }
             }
 
             /// [`Effect::input_rate`]
