@@ -392,3 +392,10 @@ fn channels_of_unequal_lag_turn_their_phasors_apart_by_it() {
     let (y_c, y_s) = turned(VIBRATION.y_c, VIBRATION.y_s, -0.5 * phase);
     reads(EffectId::DetectionPhase, [phase, 0.0, 0.0, 0.0], Envelope::new(x_c, x_s, y_c, y_s), 1e-15);
 }
+
+/// What a loop nulls in its own channel shows in what it commands, and nowhere else.
+#[test]
+fn a_lag_between_the_channels_alone_is_seen_by_the_loops_alone() {
+    let seen: Vec<_> = EffectId::ALL.iter().filter(|id| id.seen_by_loops()).collect();
+    assert_eq!(seen, [&EffectId::DetectionPhase]);
+}
