@@ -21,6 +21,8 @@ use crate::limits::Limits;
 use crate::progress::Progress;
 use crate::{Failure, output};
 
+/// What is said of all devices together.
+const SUMMARIES: [&str; 2] = ["fleet.csv", "fleet.json"];
 /// Robust deviations from the median beyond which a parameter is odd, beside its own interval.
 const ODD: f64 = 5.0;
 /// Devices from which on a distribution tells what is odd.
@@ -62,19 +64,20 @@ impl Row {
 pub(crate) fn fleet(names: &[PathBuf], out: &Path, limits: Option<&Limits>, json: bool) -> Result<(), Failure> {
     output::check_folder(out)?;
     let campaigns = campaigns(names)?;
+    output::check_folder_for(out, &SUMMARIES, &campaigns)?;
     let folders = folders(&campaigns);
     let progress = Progress::begin();
     progress.say(&format!("identifying {} campaigns", campaigns.len()));
     let rows: Vec<Row> = campaigns
-        .into_par_iter()
+        .par_iter()
         .zip(folders)
-        .map(|(campaign, folder)| device(campaign, folder, out, limits))
+        .map(|(campaign, folder)| device(campaign.clone(), folder, out, limits))
         .collect::<Result<_, _>>()?;
     drop(progress);
     let population = Population::of(&rows);
     let facts = serde_json::to_string_pretty(&population.facts(&rows)).map_err(Failure::input)?;
-    output::write(&out.join("fleet.csv"), population.table(&rows).as_bytes(), &[])?;
-    output::write(&out.join("fleet.json"), facts.as_bytes(), &[])?;
+    let [table, json_file] = SUMMARIES;
+    output::write_all(out, &[(table, population.table(&rows).as_bytes()), (json_file, facts.as_bytes())], &campaigns)?;
     output::tell(format_args!("wrote {}", out.join("fleet.csv").display()));
     output::answer(&if json { format!("{facts}\n") } else { population.in_words(&rows) })?;
     let outside = rows.iter().filter(|r| r.outside.is_some()).count();
@@ -95,11 +98,6 @@ fn campaigns(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             out.push(path);
             continue;
         }
-        let own = path.join("campaign.toml");
-        if own.is_file() {
-            out.push(own);
-            continue;
-        }
         let entries = std::fs::read_dir(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
         let mut inner: Vec<PathBuf> =
             entries.flatten().map(|e| e.path().join("campaign.toml")).filter(|p| p.is_file()).collect();
@@ -115,15 +113,15 @@ fn campaigns(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(out)
 }
 
-/// A folder for each campaign: the name of the campaign's own, or of its file, numbered where it comes again.
+/// A folder for each campaign: the name of the campaign's own, or of its file, numbered where another has it.
 fn folders(campaigns: &[PathBuf]) -> Vec<String> {
-    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let mut taken = BTreeSet::new();
     let name = |path: &PathBuf| {
         let named = path.file_stem().filter(|s| *s != "campaign").or_else(|| path.parent()?.file_name());
         let text = named.map_or("device".into(), |n| n.to_string_lossy().into_owned());
-        let again = seen.entry(text.clone()).or_default();
-        *again += 1;
-        if *again == 1 { text } else { format!("{text}-{again}") }
+        let numbered = (2..).map(|again| format!("{text}-{again}"));
+        let free = std::iter::once(text.clone()).chain(numbered).find(|name| taken.insert(name.clone()));
+        free.unwrap_or(text)
     };
     campaigns.iter().map(name).collect()
 }
@@ -352,4 +350,17 @@ fn number(value: Option<f64>) -> String {
 /// A text as a cell (RFC 4180).
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_campaigns_share_a_folder_of_results() {
+        let paths =
+            ["a/unit/campaign.toml", "b/unit/campaign.toml", "c/unit-2/campaign.toml", "unit.toml", "unit-2.toml"];
+        let folders = folders(&paths.map(PathBuf::from));
+        assert_eq!(folders, ["unit", "unit-2", "unit-2-2", "unit-3", "unit-2-3"]);
+    }
 }

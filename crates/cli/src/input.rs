@@ -59,12 +59,8 @@ pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut out: Vec<PathBuf> = Vec::new();
     for name in names {
         let text = name.to_string_lossy();
-        if let Some(campaign) = Some(name.join("campaign.toml")).filter(|path| path.is_file()) {
-            out.push(campaign);
-            continue;
-        }
         if name.exists() || !text.contains(['*', '?', '[']) {
-            out.push(name.clone());
+            out.push(campaign_in(name));
             continue;
         }
         let bad = |what: String| Failure::input(format!("{text}: {what}"));
@@ -75,7 +71,7 @@ pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         if found.is_empty() {
             return Err(bad("no file has a name like this".into()));
         }
-        out.extend(found);
+        out.extend(found.iter().map(|path| campaign_in(path)));
     }
     if out.iter().filter(|p| is_standard_input(p)).count() > 1 {
         return Err(Failure::input("standard input can be read only once"));
@@ -84,6 +80,12 @@ pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         return Err(Failure::input(format!("{}: is named twice", out[twice].display())));
     }
     Ok(out)
+}
+
+/// The campaign in a folder; anything else as it is.
+fn campaign_in(path: &Path) -> PathBuf {
+    let campaign = path.join("campaign.toml");
+    if campaign.is_file() { campaign } else { path.to_owned() }
 }
 
 /// Whether a file is a campaign by its name.
