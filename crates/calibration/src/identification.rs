@@ -10,6 +10,7 @@ use crate::diagnostics::plots::{PlotContext, PlotData};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
+use crate::diagnostics::scale_factor::{gains, scale_factor};
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
@@ -24,7 +25,6 @@ use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
-use crate::report::scale_factor::{gains, scale_factor};
 use crate::report::stages::stages;
 use crate::report::unexplained::{described, unexplained};
 use crate::report::{
@@ -217,6 +217,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     let facts = Facts {
         instrument: dataset.instrument,
         period_deg: dataset.start.period_rad.to_degrees(),
+        tells_gain: true,
         stated: dataset.screen.stated(),
         held_out: after.errors().count(),
         fitted_rms_deg: on_fit.mean_square().sqrt().to_degrees(),
@@ -300,12 +301,17 @@ fn no_better(heldout: &Heldout, samples: usize) -> Option<String> {
     let raw = heldout.raw?.rms_deg;
     let rms = heldout.discovered.rms_deg;
     let by_chance = 1.0 / (2.0 * samples.max(1) as f64).sqrt();
-    (rms > raw * (1.0 + by_chance)).then(|| {
-        format!(
-            "nothing that was found helps on held-out data: {rms:.3e}° rms with it, {raw:.3e}° without; the calibration \
-             leaves the angle as it is"
-        )
-    })
+    (rms > raw * (1.0 + by_chance)).then(|| no_help(heldout))
+}
+
+/// Why a calibration leaves the angle as it is.
+pub(crate) fn no_help(heldout: &Heldout) -> String {
+    let without = heldout.raw.map_or(String::new(), |raw| format!(", {:.3e}° without", raw.rms_deg));
+    format!(
+        "nothing that was found helps on held-out data: {:.3e}° rms with it{without}; the calibration leaves the angle as \
+         it is",
+        heldout.discovered.rms_deg
+    )
 }
 
 pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {

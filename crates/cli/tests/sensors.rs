@@ -62,8 +62,8 @@ fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 3] {
 }
 
 /// Within the interval, widened by half: the check is one draw.
-fn holds([value, low, high]: [f64; 3], truth: f64) -> bool {
-    (value - truth).abs() <= 0.75 * (high - low)
+fn holds([value, low, high]: [f64; 3], set: f64) -> bool {
+    (value - set).abs() <= 0.75 * (high - low)
 }
 
 #[test]
@@ -75,9 +75,9 @@ fn two_channels_without_a_reference_tell_offsets_gain_skew_and_cubic() {
     let ratio = &r["detection_gain_ratio"];
     let ratio = [&ratio["value"], &ratio["ci95"][0], &ratio["ci95"][1]].map(|v| v.as_f64().unwrap());
     assert!(holds(ratio, GAIN_RATIO) && (ratio[0] - GAIN_RATIO).abs() < 2e-3, "{ratio:?}");
-    for (name, truth) in [("offset_x", OFFSET[0]), ("offset_y", OFFSET[1])] {
+    for (name, set) in [("offset_x", OFFSET[0]), ("offset_y", OFFSET[1])] {
         let p = parameter(&r, "detection-offset", name);
-        assert!((p[0] / unit - truth).abs() < 5e-4, "{name} {p:?}");
+        assert!((p[0] / unit - set).abs() < 5e-4, "{name} {p:?}");
     }
     let skew = parameter(&r, "detection-skew", "skew");
     assert!((skew[0] - SKEW).abs() < 1e-3, "{skew:?}");

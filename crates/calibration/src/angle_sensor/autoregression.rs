@@ -22,36 +22,19 @@ pub(crate) fn gain(before: &[Vec<f64>], after: &[Vec<f64>], unknowns: usize) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A first-order autoregression from a generator of Lehmer's.
-    fn remembered(memory: f64, seed: u64) -> Vec<f64> {
-        let mut state = seed.max(1);
-        let mut last = 0.0;
-        (0..2000)
-            .map(|_| {
-                let sum: f64 = (0..12)
-                    .map(|_| {
-                        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                        (state >> 33) as f64 / (1u64 << 31) as f64
-                    })
-                    .sum();
-                last = memory * last + sum - 6.0;
-                last
-            })
-            .collect()
-    }
+    use crate::estimation::statistics::remembered;
 
     #[test]
     fn the_innovation_of_an_autoregression_is_its_own() {
         for memory in [0.0, 0.5, 0.95] {
-            let found = innovation(&remembered(memory, 7));
+            let found = innovation(&remembered(memory, 2000, 7));
             assert!((found - 1.0).abs() < 0.1, "{memory}: {found}");
         }
     }
 
     #[test]
     fn a_slow_wave_fitted_to_slow_noise_is_no_gain() {
-        let noise = remembered(0.98, 3);
+        let noise = remembered(0.98, 2000, 3);
         let n = noise.len() as f64;
         let wave = |i: usize| (std::f64::consts::TAU * i as f64 / n).sin();
         let amplitude: f64 = noise.iter().enumerate().map(|(i, e)| e * wave(i)).sum::<f64>() * 2.0 / n;

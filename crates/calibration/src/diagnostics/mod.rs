@@ -6,3 +6,4 @@ pub(crate) mod decomposition;
 pub(crate) mod evaluate;
 pub mod plots;
 pub(crate) mod residual;
+pub(crate) mod scale_factor;

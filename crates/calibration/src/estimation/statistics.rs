@@ -52,3 +52,22 @@ pub(crate) fn circular_mean(angles: impl Iterator<Item = f64>, period: f64) -> f
     }
     s.atan2(c) / k
 }
+
+/// Noise for tests: a first-order autoregression of normal values with a deviation of one, from a generator of Lehmer's.
+#[cfg(test)]
+pub(crate) fn remembered(memory: f64, count: usize, seed: u64) -> Vec<f64> {
+    let mut state = seed.max(1);
+    let mut last = 0.0;
+    (0..count)
+        .map(|_| {
+            let sum: f64 = (0..12)
+                .map(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    (state >> 33) as f64 / (1u64 << 31) as f64
+                })
+                .sum();
+            last = memory * last + sum - 6.0;
+            last
+        })
+        .collect()
+}

@@ -8,7 +8,6 @@ use super::phase::phase;
 use super::report::{Errors, Finding, report};
 use super::runs::DecayRun;
 use super::selection::{choose, is_declared, is_sound};
-use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
 use crate::error::Refusal;
 use crate::identification::{Identification, Options, run_report};
 use crate::recording::{Campaign, RunKind};
@@ -84,11 +83,6 @@ impl Head {
 
 /// Part of a run, in four parts, that is held out where no run is.
 const FITTED_QUARTERS: usize = 3;
-/// Standard errors of a root mean square by which one that is larger is so by no chance.
-const NO_CHANCE: f64 = 3.0;
-/// Held-out stretches below which an error says nothing.
-const FEWEST_HELD: usize = 16;
-
 /// Identifies a campaign that [`serves`].
 ///
 /// # Errors
@@ -113,14 +107,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     (options.progress)("measuring the held-out error");
     let declared = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.declared);
     let mut errors = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.discovered);
-    if errors.held_out() < FEWEST_HELD {
-        return Err(Refusal::no_answer(
-            &head.device,
-            "too few stretches are left to test an answer on",
-            "a longer decay, or a run with use = \"holdout\"",
-        ));
-    }
-    if worse(&errors) {
+    if errors.worse_than(&errors.declared) {
         head.warnings.push(format!(
             "what the paper's model lacks was not taken: on held-out data it leaves {:.4e}°, and without it {:.4e}° are left",
             errors.after.size().rms_deg,
@@ -151,14 +138,6 @@ fn sound(fit: &Fit, device: &str) -> Result<(), Refusal> {
         "the equation of motion does not follow these decays",
         "decays without loops or forces, longer ones, or at several starting angles",
     ))
-}
-
-/// The held-out error is larger with what was discovered than without, and by no chance.
-fn worse(errors: &Errors) -> bool {
-    let count = errors.held_out();
-    let remembered = inflation(&autocorrelation(&errors.after, WHITENESS_LAGS), count);
-    let by_chance = NO_CHANCE * (remembered / (2.0 * count.max(1) as f64)).sqrt();
-    errors.after.size().rms_deg > errors.declared.size().rms_deg * (1.0 + by_chance)
 }
 
 impl Errors {

@@ -72,28 +72,12 @@ impl Autoregression {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn remembered(memory: f64, n: usize) -> Vec<f64> {
-        let mut state = 7u64;
-        let mut last = 0.0;
-        (0..n)
-            .map(|_| {
-                let sum: f64 = (0..12)
-                    .map(|_| {
-                        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                        (state >> 33) as f64 / (1u64 << 31) as f64
-                    })
-                    .sum();
-                last = memory * last + sum - 6.0;
-                last
-            })
-            .collect()
-    }
+    use crate::estimation::statistics::remembered;
 
     #[test]
     fn what_is_left_of_remembered_noise_is_white_and_of_size_one() {
         for memory in [0.0, 0.6, 0.95] {
-            let noise = remembered(memory, 4000);
+            let noise = remembered(memory, 4000, 7);
             let ar = Autoregression::of(std::slice::from_ref(&noise));
             let white = ar.whitened(&noise);
             let square = white.iter().map(|w| w * w).sum::<f64>() / white.len() as f64;

@@ -13,13 +13,14 @@ use super::selection::Chosen;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::plots_of;
 use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
+    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, inflation, ljung_box, reported_harmonics,
 };
 use crate::error::Refusal;
-use crate::identification::{BiasCurve, Figures, Identification};
+use crate::identification::{BiasCurve, Figures, Identification, no_help};
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::Instrument;
 use crate::report::calibration::{Calibration, Provenance};
+use crate::report::gate::{self, Facts};
 use crate::report::stages::stages;
 use crate::report::{
     DecayReport, EffectReport, Estimate, Heldout, Report, ResidualReport, RunReport, SCHEMA, Status, StepReport, Tool,
@@ -33,7 +34,18 @@ pub(crate) struct Errors {
     pub(crate) after: Evaluation,
 }
 
+/// Standard errors of a root mean square by which one that is larger is so by no chance.
+const NO_CHANCE: f64 = 3.0;
+
 impl Errors {
+    /// What was found leaves a larger held-out error than that, and by no chance.
+    pub(crate) fn worse_than(&self, other: &Evaluation) -> bool {
+        let count = self.held_out();
+        let remembered = inflation(&autocorrelation(&self.after, WHITENESS_LAGS), count);
+        let by_chance = NO_CHANCE * (remembered / (2.0 * count.max(1) as f64)).sqrt();
+        self.after.size().rms_deg > other.size().rms_deg * (1.0 + by_chance)
+    }
+
     /// Stretches that the errors are counted on.
     pub(crate) fn held_out(&self) -> usize {
         self.after.errors().count()
@@ -74,13 +86,18 @@ pub(crate) fn report(
     let effects = effects(finding, fitted);
     let mut warnings = head.warnings.clone();
     warnings.extend(remarks(finding, fitted, held, &head));
-    let gain = finding.fit.model.has(Term::AngularGain);
-    let hypothesis = hypothesis(finding, &head);
+    // a slow rotation may tell everything but the gain
+    let gain = Some(estimate(&finding.fit, Term::AngularGain))
+        .filter(|e| finding.fit.model.has(Term::AngularGain) && gate::gain_is_told(e));
+    if finding.fit.model.has(Term::AngularGain) && gain.is_none() {
+        warnings.push("the campaign cannot tell the angular gain: `decay` has the precession rate itself".into());
+    }
+    let (hypothesis, stated) = (hypothesis(finding, &head), head.stated_gain);
     let mut steps = stages(Some(raw_errors), declared, found, &[]);
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, finding)));
     let names: Vec<String> = if held.is_empty() { fitted } else { held }.iter().map(|r| r.name.clone()).collect();
     let plots = with_plots.then(|| plots_of(&names, Some(raw_errors), declared, found, &hypothesis));
-    let report = Report {
+    let mut report = Report {
         schema: SCHEMA.into(),
         status: Status::Answered,
         reason: None,
@@ -88,7 +105,7 @@ pub(crate) fn report(
         inputs: head.inputs.clone(),
         device: head.device.clone(),
         instrument: "gyroscope".into(),
-        angular_gain: if gain { estimate(&finding.fit, Term::AngularGain) } else { Estimate::unknown() },
+        angular_gain: gain.unwrap_or_else(Estimate::unknown),
         detection_gain_ratio: finding.fit.model.has(Term::GainRatio).then(|| {
             let e = estimate(&finding.fit, Term::GainRatio);
             Estimate { value: 1.0 + e.value, ci95: e.ci95.map(|end| 1.0 + end) }
@@ -113,12 +130,24 @@ pub(crate) fn report(
         decay: Some(decay(finding, fitted, &head)),
         warnings,
     };
-    if !report.heldout.discovered.rms_deg.is_finite() || !report.heldout.declared.rms_deg.is_finite() {
-        return Err(Refusal::no_answer(&head.device, "the angle error is no number", "decays with a pattern angle"));
-    }
     let figures = Figures { bias: curves(&names, raw_errors, declared, found), ring_downs: Vec::new() };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: None };
-    let calibration = Calibration { device: head.device, hypothesis, provenance };
+    let mut calibration = Calibration { device: head.device, hypothesis, provenance };
+    let facts = Facts {
+        instrument: Instrument::Gyroscope,
+        period_deg: 180.0,
+        tells_gain: gain.is_some(),
+        stated,
+        held_out: finding.errors.held_out(),
+        fitted_rms_deg: on_fit.size().rms_deg,
+    };
+    gate::pass(&report, &calibration, facts)?;
+    if finding.errors.worse_than(raw_errors) {
+        let reason = no_help(&report.heldout);
+        (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
+        report.warnings.insert(0, reason);
+        calibration.hypothesis.members.clear();
+    }
     Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })
 }
 

@@ -26,6 +26,8 @@ const USUAL_GAIN: std::ops::RangeInclusive<f64> = 0.2..=LARGEST_GAIN;
 pub(crate) struct Facts {
     pub(crate) instrument: Instrument,
     pub(crate) period_deg: f64,
+    /// the runs can tell the angular gain; where none turns, there is nothing to judge
+    pub(crate) tells_gain: bool,
     /// the angular gain that the campaign states
     pub(crate) stated: Option<f64>,
     /// held-out samples that errors were counted on
@@ -46,13 +48,15 @@ pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> 
             "a longer run, or one with use = \"holdout\"",
         );
     }
-    if let Some(what) = unreal(report) {
+    if let Some(what) = unreal(report, facts) {
         return refuse(
             format!("the fit of {what} did not converge to a number"),
             "other runs, or fewer of them at once",
         );
     }
-    angular_gain(report, facts)?;
+    if facts.tells_gain {
+        angular_gain(report, facts)?;
+    }
     let errors = [report.heldout.discovered.rms_deg, facts.fitted_rms_deg];
     if let Some(rms) = errors.into_iter().find(|rms| *rms > LARGEST_ERROR * facts.period_deg) {
         return refuse(
@@ -74,10 +78,10 @@ pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> 
 }
 
 /// The first number of a report that is none.
-fn unreal(report: &Report) -> Option<String> {
+fn unreal(report: &Report, facts: Facts) -> Option<String> {
     let whole = |e: &Estimate| e.value.is_finite() && e.ci95.iter().all(|v| v.is_finite()) && e.ci95[0] <= e.ci95[1];
     let named = [
-        ("angular_gain", Some(report.angular_gain)),
+        ("angular_gain", facts.tells_gain.then_some(report.angular_gain)),
         ("detection_gain_ratio", report.detection_gain_ratio),
         ("actuation_gain_ratio", report.actuation_gain_ratio),
     ];
@@ -96,10 +100,15 @@ fn unreal(report: &Report) -> Option<String> {
     })
 }
 
+/// An angular gain is known well enough to be one.
+pub(crate) fn gain_is_told(k: &Estimate) -> bool {
+    k.half_width() <= WIDEST_GAIN * k.value.abs()
+}
+
 /// An angular gain is told, and one that the instrument can have.
 fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
     let k = report.angular_gain;
-    if k.half_width() > WIDEST_GAIN * k.value.abs() {
+    if !gain_is_told(&k) {
         return Err(Refusal::no_answer(
             &report.device,
             format!("the angular gain is not told: {:.4} ± {:.1e}", k.value, k.half_width()),

@@ -8,7 +8,6 @@ pub(crate) mod gate;
 pub(crate) mod provenance;
 pub mod refused;
 pub(crate) mod runs;
-pub(crate) mod scale_factor;
 pub(crate) mod stages;
 pub mod survey;
 pub(crate) mod unexplained;

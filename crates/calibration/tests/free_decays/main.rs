@@ -25,8 +25,8 @@ fn parameter(report: &Report, effect: &str, name: &str) -> Estimate {
     Estimate { value: p.value, ci95: p.ci95.expect("an interval") }
 }
 
-fn is_within(truth: f64, e: &Estimate) -> bool {
-    (e.ci95[0]..=e.ci95[1]).contains(&truth)
+fn is_within(set: f64, e: &Estimate) -> bool {
+    (e.ci95[0]..=e.ci95[1]).contains(&set)
 }
 
 fn discovered(report: &Report) -> Vec<&str> {
@@ -34,7 +34,7 @@ fn discovered(report: &Report) -> Vec<&str> {
 }
 
 /// What a usual ring is, with what was found of it.
-fn truths(report: &Report) -> [(f64, Estimate); 6] {
+fn set_values(report: &Report) -> [(f64, Estimate); 6] {
     [
         (1.0 / 22.0, report.decay.as_ref().unwrap().damping_per_s),
         (0.78, report.angular_gain),
@@ -52,23 +52,23 @@ fn decays_at_eight_angles_tell_the_split_to_a_thousandth() {
     let report = identified(&Ring::usual(), &ANGLES, "rate_dps = 10.0", 1);
     let split = parameter(&report, "anisoelasticity", "anisoelasticity");
     assert!((split.value / SPLIT - 1.0).abs() < 1e-3, "{split:?}");
-    for (truth, e) in truths(&report) {
-        assert!((e.value - truth).abs() < 2.0 * e.half_width(), "{truth}: {e:?}");
+    for (set, e) in set_values(&report) {
+        assert!((e.value - set).abs() < 2.0 * e.half_width(), "{set}: {e:?}");
     }
     assert!(report.residual.white);
     assert!(report.heldout.declared.rms_deg < 0.1 * report.heldout.raw.unwrap().rms_deg);
     assert_eq!(discovered(&report), [""; 0]);
 }
 
-/// How many of the truths lie within their intervals in so many campaigns, one count a parameter, and how many discoveries
+/// How many of the set values lie within their intervals in so many campaigns, one count a parameter, and how many discoveries
 /// were made of what is not there.
 fn covered(ring: &Ring, campaigns: u64) -> ([u64; 6], usize) {
     let reports: Vec<Report> =
         (0..campaigns).into_par_iter().map(|seed| identified(ring, &ANGLES, "rate_dps = 10.0", 100 + seed)).collect();
     let mut counts = [0; 6];
     for report in &reports {
-        for (count, (truth, e)) in counts.iter_mut().zip(truths(report)) {
-            *count += u64::from(is_within(truth, &e));
+        for (count, (set, e)) in counts.iter_mut().zip(set_values(report)) {
+            *count += u64::from(is_within(set, &e));
         }
     }
     (counts, reports.iter().map(|r| discovered(r).len()).sum())
@@ -113,8 +113,8 @@ fn unequal_gains_of_the_readout_are_told_from_anisodamping() {
     let report = identified(&ring, &ANGLES, "rate_dps = 10.0", 4);
     let ratio = report.detection_gain_ratio.expect("the gain ratio is told");
     assert!((ratio.value - 1.0132).abs() < 2.0 * ratio.half_width(), "{ratio:?}");
-    for (truth, e) in truths(&report) {
-        assert!((e.value - truth).abs() < 2.0 * e.half_width(), "{truth}: {e:?}");
+    for (set, e) in set_values(&report) {
+        assert!((e.value - set).abs() < 2.0 * e.half_width(), "{set}: {e:?}");
     }
 }
 
@@ -125,8 +125,18 @@ fn without_a_stated_rate_precession_is_told_and_the_angular_gain_is_not() {
     let written = serde_json::to_value(&report).unwrap();
     assert!(written["angular_gain"].is_null());
     let precession = report.decay.unwrap().precession_dph;
-    let truth = -0.78 * 10.0 * 3600.0;
-    assert!((precession.value - truth).abs() < 2.0 * precession.half_width(), "{precession:?}");
+    let set = -0.78 * 10.0 * 3600.0;
+    assert!((precession.value - set).abs() < 2.0 * precession.half_width(), "{precession:?}");
+}
+
+#[test]
+fn an_angular_gain_that_no_resonator_has_is_no_answer_of_a_decay_either() {
+    let folder = tempfile::tempdir().unwrap();
+    // 10 deg/s, written in rad/s
+    let path = Ring::usual().campaign(folder.path(), &ANGLES, "rate_dps = 0.174533", 7);
+    let refusal =
+        identify(Campaign::open(&path).unwrap(), &Options::default()).map(|i| i.report.angular_gain).unwrap_err();
+    assert!(refusal.to_string().contains("as if in rad/s"), "{refusal}");
 }
 
 #[test]

@@ -176,7 +176,7 @@ impl Thrift<'_> {
                 let head = self.byte()?;
                 let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
                 (0..count).try_for_each(|_| match head & 0x0f {
-                    // a truth has a byte of its own within a list
+                    // a boolean has a byte of its own within a list
                     1 | 2 => self.pass(1),
                     kind => self.skip(kind, depth + 1),
                 })
