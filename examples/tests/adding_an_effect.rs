@@ -99,7 +99,17 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
     // builds of its own: cargo names crates by their place within the workspace, and would take the copy's for ours
     let target = std::env::current_exe()?.ancestors().nth(3).map(Path::to_owned).ok_or("no folder of builds")?;
     let output = Command::new(env!("CARGO"))
-        .args(["test", "--workspace", "--locked", "--test", "effects", "--test", "cross_cubic"])
+        .args([
+            "test",
+            "--workspace",
+            "--locked",
+            "--test",
+            "effects",
+            "--test",
+            "effect_signatures",
+            "--test",
+            "cross_cubic",
+        ])
         .current_dir(folder.path())
         .env("CARGO_TARGET_DIR", target.join("adding-an-effect"))
         .env("INSTA_UPDATE", "always")

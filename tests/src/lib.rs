@@ -15,6 +15,7 @@ pub mod blind;
 #[cfg(feature = "recordings")]
 pub mod carrier;
 pub mod domain;
+pub mod effects;
 pub mod envelope_loop;
 pub mod proof;
 pub mod scalar;
