@@ -5,8 +5,9 @@ mod foucault;
 mod ring;
 
 use cvg_calibration::recording::Campaign;
-use cvg_calibration::report::{Estimate, Report};
+use cvg_calibration::report::{Estimate, Report, Status};
 use cvg_calibration::{Options, Origin, identify};
+use cvg_model::resonator::Anisotropy;
 use foucault::Pendulum;
 use rayon::prelude::*;
 use ring::Ring;
@@ -140,9 +141,33 @@ fn an_angular_gain_that_no_resonator_has_is_no_answer_of_a_decay_either() {
 }
 
 #[test]
+fn what_does_not_help_the_decays_of_another_day_is_not_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    // anisodamping lies across that of the decays that are fitted, and there is hardly a split
+    let mut ring = Ring::usual();
+    ring.resonator.anisoelasticity = Anisotropy::new(1e-3, 0.7);
+    let path = ring.campaign(folder.path(), &ANGLES, "rate_dps = 10.0", 8);
+    ring.resonator.anisodamping = Anisotropy::new(4.7e-3, 0.4 + std::f64::consts::FRAC_PI_2);
+    let another_day = folder.path().join("another-day");
+    std::fs::create_dir(&another_day).unwrap();
+    ring.campaign(&another_day, &ANGLES, "", 9);
+    let held = "kind = \"decay\"\nrate_dps = 10.0\nuse = \"holdout\"\n";
+    let runs = (0..ANGLES.len()).map(|at| format!("\n[[run]]\nfile = \"another-day/decay-{at}.csv\"\n{held}"));
+    let campaign = std::fs::read_to_string(&path).unwrap() + &runs.collect::<String>();
+    std::fs::write(&path, campaign).unwrap();
+
+    let identified = identify(Campaign::open(&path).unwrap(), &Options::default()).unwrap();
+    let report = &identified.report;
+    assert_eq!(report.status, Status::Neutral, "{:?}", report.heldout);
+    assert!(report.reason.as_ref().unwrap().contains("nothing that was found helps"), "{:?}", report.reason);
+    assert!(report.heldout.discovered.rms_deg > report.heldout.raw.unwrap().rms_deg, "{:?}", report.heldout);
+    assert_eq!(identified.calibration.hypothesis.members, []);
+}
+
+#[test]
 fn a_decay_near_one_angle_leaves_anisodamping_unsaid() {
     let mut ring = Ring { rate_dps: 0.0, noise_v: 1e-4, ..Ring::usual() };
-    ring.resonator.anisoelasticity = cvg_model::resonator::Anisotropy::new(1e-3, 0.7);
+    ring.resonator.anisoelasticity = Anisotropy::new(1e-3, 0.7);
     let report = identified(&ring, &[10.0], "", 6);
     assert!(report.effects.iter().all(|e| e.id != "anisodamping"));
     assert!(report.warnings.iter().any(|w| w.contains("near one angle")), "{:?}", report.warnings);
