@@ -1,6 +1,7 @@
 //! "Add an effect" of the book, followed to the letter: its blocks are put into a copy of the repository, and the tests that
 //! it names are run there.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,6 +77,50 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Gives the builds of `to` what those of `from` have of other people's crates, so that these are not built twice. They are
+/// the same files: cargo knows a crate from a registry by its version, features and profile, and builds what does not fit.
+fn shared(from: &Path, to: &Path) -> Result<()> {
+    let Ok(units) = fs::read_dir(from.join(".fingerprint")) else { return Ok(()) };
+    let units = units.map(|unit| Ok(unit?.file_name().to_string_lossy().into_owned()));
+    let theirs = |name: &String| !["cvg", "kani", "xtask"].iter().any(|ours| name.starts_with(ours));
+    let units: Vec<String> =
+        units.filter(|name: &Result<String>| name.as_ref().is_ok_and(theirs)).collect::<Result<_>>()?;
+    for unit in &units {
+        for folder in [".fingerprint", "build"] {
+            linked(&from.join(folder).join(unit), &to.join(folder).join(unit))?;
+        }
+    }
+    let hashes: BTreeSet<&str> = units.iter().filter_map(|unit| Some(unit.rsplit_once('-')?.1)).collect();
+    for entry in fs::read_dir(from.join("deps"))? {
+        let name = entry?.file_name();
+        let text = name.to_string_lossy();
+        let hash = text.split_once('.').map_or(text.as_ref(), |(stem, _)| stem).rsplit_once('-').map(|(_, hash)| hash);
+        if hash.is_some_and(|hash| hashes.contains(hash)) {
+            linked(&from.join("deps").join(&name), &to.join("deps").join(&name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Puts what is at `from` at `to` where nothing is yet, with its times: by them cargo sees what is out of date.
+fn linked(from: &Path, to: &Path) -> Result<()> {
+    if from.is_dir() {
+        for entry in fs::read_dir(from)? {
+            let entry = entry?;
+            linked(&entry.path(), &to.join(entry.file_name()))?;
+        }
+    } else if from.is_file() && !to.exists() {
+        fs::create_dir_all(to.parent().ok_or("no folder")?)?;
+        let library = ["rlib", "rmeta", "so", "dylib", "dll"].iter().any(|e| from.extension().is_some_and(|x| x == *e));
+        // what is never written in place may be one file, anything else is a copy
+        if !library || fs::hard_link(from, to).is_err() {
+            fs::copy(from, to)?;
+            fs::File::options().write(true).open(to)?.set_modified(fs::metadata(from)?.modified()?)?;
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
     let (root, folder) = (repository(), tempfile::tempdir()?);
@@ -98,6 +143,8 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
     }
     // builds of its own: cargo names crates by their place within the workspace, and would take the copy's for ours
     let target = std::env::current_exe()?.ancestors().nth(3).map(Path::to_owned).ok_or("no folder of builds")?;
+    let own = target.join("adding-an-effect");
+    shared(&target.join("debug"), &own.join("debug"))?;
     let output = Command::new(env!("CARGO"))
         .args([
             "test",
@@ -111,7 +158,7 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
             "cross_cubic",
         ])
         .current_dir(folder.path())
-        .env("CARGO_TARGET_DIR", target.join("adding-an-effect"))
+        .env("CARGO_TARGET_DIR", own)
         .env("INSTA_UPDATE", "always")
         .output()?;
     let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));

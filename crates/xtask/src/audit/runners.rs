@@ -44,7 +44,8 @@ fn build(repository: &Path, asked: &[&str]) -> Result<BTreeMap<String, (PathBuf,
         return Ok(BTreeMap::new());
     }
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.args(["test", "--no-run", "--message-format=json", "-p", "cvg-tests", "-p", "cvg-prover"]);
+    // of all packages: what they depend on then has the features of `cargo test --workspace`, and nothing is built again
+    command.args(["test", "--no-run", "--message-format=json", "--workspace"]);
     command.args(asked.iter().flat_map(|name| ["--test", name]));
     let output =
         command.current_dir(repository).stderr(Stdio::inherit()).output().map_err(|e| format!("cargo: {e}"))?;
@@ -58,9 +59,11 @@ fn build(repository: &Path, asked: &[&str]) -> Result<BTreeMap<String, (PathBuf,
         if let (Some(name), Some(binary), Some(manifest)) =
             (text("/target/name"), text("/executable"), text("/manifest_path"))
             && asked.contains(&name)
+            && let Some(folder) = Path::new(manifest).parent()
+            // other packages have tests of the same names
+            && ["tests", "crates/prover"].iter().any(|own| folder == repository.join(own))
         {
-            let folder = Path::new(manifest).parent().map(Path::to_owned).unwrap_or_default();
-            found.insert(name.to_owned(), (PathBuf::from(binary), folder));
+            found.insert(name.to_owned(), (PathBuf::from(binary), folder.to_owned()));
         }
     }
     Ok(found)
