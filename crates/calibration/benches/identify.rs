@@ -44,7 +44,7 @@ fn fits(campaign: Campaign) -> Duration {
         "measuring the held-out error" => to.set(Some(Instant::now())),
         _ => {}
     };
-    let options = Options { discover: false, progress: &progress };
+    let options = Options { discover: false, progress: &progress, ..Options::default() };
     black_box(identify(campaign, &options).expect("the paper's campaign has an answer"));
     let (from, to): (Option<Instant>, Option<Instant>) = (from.get(), to.get());
     to.expect("the fits end") - from.expect("the fits begin")

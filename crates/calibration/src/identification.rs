@@ -38,13 +38,15 @@ use crate::selection::last_step::last_step;
 pub struct Options<'a> {
     /// look for undeclared effects
     pub discover: bool,
+    /// effects written down as text ([`crate::EffectText::effect`]), which compete with the library's
+    pub effects: Vec<EffectId>,
     /// told what is going on
     pub progress: &'a dyn Fn(&str),
 }
 
 impl Default for Options<'_> {
     fn default() -> Self {
-        Self { discover: true, progress: &|_| {} }
+        Self { discover: true, effects: Vec::new(), progress: &|_| {} }
     }
 }
 
@@ -114,7 +116,9 @@ pub fn identify_with_plots(campaign: Campaign, options: &Options<'_>) -> Result<
 fn run(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
-        return free_decay::identify(campaign, options, with_plots);
+        let mut identified = free_decay::identify(campaign, options, with_plots)?;
+        identified.report.warnings.extend(not_tried(options, "free decays"));
+        return Ok(identified);
     }
     let (campaign, decays) = free_decay::apart(campaign);
     let mut identified = looped(campaign, options, with_plots)?;
@@ -128,7 +132,9 @@ fn run(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Id
 fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
-        return angle_sensor::identify(campaign, options, with_plots);
+        let mut identified = angle_sensor::identify(campaign, options, with_plots)?;
+        identified.report.warnings.extend(not_tried(options, "an angle sensor"));
+        return Ok(identified);
     }
     let device = campaign.device.clone();
     let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
@@ -136,6 +142,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     let amplitude_v = provenance::amplitudes(&campaign);
     (options.progress)("preparing the runs");
     let mut dataset = Dataset::new(campaign)?;
+    dataset.written.clone_from(&options.effects);
     (options.progress)("fitting the declared model");
     let paper = declared_hypothesis(&dataset.start);
     let declared = fit_with_ring_downs(&mut dataset, &paper)?;
@@ -275,6 +282,17 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
         calibration,
         steps,
         plots,
+    })
+}
+
+/// Says that effects as text had no part in an answer.
+fn not_tried(options: &Options<'_>, of: &str) -> Option<String> {
+    let ids: Vec<&str> = options.effects.iter().map(|e| e.description().id).collect();
+    (!ids.is_empty()).then(|| {
+        format!(
+            "{} had no part in this: effects as text compete in a gyroscope's rotation runs, not in {of}",
+            ids.join(", ")
+        )
     })
 }
 

@@ -58,6 +58,8 @@ pub use estimation::{actuation, bias, identifiability};
 pub use identification::{BiasCurve, Figures, Identification, Options, identify, identify_with_plots};
 pub use model::angle_table::{AngleTable, Form};
 pub use model::hypothesis::{ChannelClip, Hypothesis, Member, Origin, Unknown};
+pub use model::written::export::export;
+pub use model::written::{EffectText, ParameterText};
 pub use report::calibration;
 pub use report::compensate::{compensate, left_out, outside};
 pub use selection::discovery;

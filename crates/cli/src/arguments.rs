@@ -39,6 +39,7 @@ Examples:
   cvg identify export.csv --map t_s=Time --map theta_deg=Ch3 --map rate_dps=Table
   cvg identify export.csv --map 't_s=Time (ms)*0.001' --map xc_v=Ch1 --map yc_v=Ch2 --map table_deg=Pos
   cvg identify campaign.toml --limits limits.toml  pass or fail on numbers of the report
+  cvg identify campaign.toml --effect my-effect.toml  an effect of your own competes with the library's
   gunzip -c rot.csv.gz | cvg identify - --json";
 
 const INSPECT: &str = "\
@@ -61,6 +62,12 @@ Examples:
   cvg compare before after                          two folders of results
   cvg compare monday/report.json friday/report.json --json
   cvg compare a/calibration.toml b/calibration.toml values alone: a calibration has no intervals";
+
+const EFFECTS: &str = "\
+Examples:
+  cvg effects                                       one line for each
+  cvg effects detection-cubic                       one in full
+  cvg effects --export detection-cubic > my-effect.toml";
 
 const COMPLETIONS: &str = "\
 Examples:
@@ -168,6 +175,9 @@ pub(crate) enum Command {
         /// Two channels that read a sine and a cosine, and no gyroscope: instrument = "sensor", with a period of 360°
         #[arg(long)]
         sensor: bool,
+        /// An effect written down as text (TOML), which competes with the library's; once for each
+        #[arg(long, value_name = "EFFECT")]
+        effect: Vec<PathBuf>,
         /// Limits of numbers of the report (TOML); a line each, and exit status 1 where one fails
         #[arg(long, value_name = "LIMITS")]
         limits: Option<PathBuf>,
@@ -218,9 +228,13 @@ pub(crate) enum Command {
         mapping: Mapping,
     },
     /// The library of effects: what a recording can hold
+    #[command(after_help = EFFECTS)]
     Effects {
         /// Show this one in full
         effect: Option<String>,
+        /// Print this one as an effect file, to begin one of your own with
+        #[arg(long, value_name = "ID", conflicts_with_all = ["effect", "json", "markdown"])]
+        export: Option<String>,
         /// Print the library as JSON
         #[arg(long, conflicts_with = "markdown")]
         json: bool,

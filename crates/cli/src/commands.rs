@@ -6,7 +6,8 @@ use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::Campaign;
 use cvg_calibration::report::refused::{About, Refused};
-use cvg_calibration::{Answer, Cause, Identification, Options};
+use cvg_calibration::{Answer, Cause, EffectText, Identification, Options};
+use cvg_model::effects::EffectId;
 use cvg_simulator::{Scenario, ScenarioError};
 
 use crate::arguments::Arguments;
@@ -43,9 +44,24 @@ fn scenario_problem(error: &ScenarioError, text: &str) -> String {
     format!("line {line}, column {column}: {message}")
 }
 
+/// Effects as text, each by a name of its own.
+pub(crate) fn written(files: &[PathBuf]) -> Result<Vec<EffectId>, Failure> {
+    let mut effects: Vec<EffectId> = Vec::new();
+    for file in files {
+        let effect = EffectText::read(file)?.effect(&file.display().to_string())?;
+        let id = effect.description().id;
+        if effects.iter().any(|e| e.description().id == id) {
+            return Err(Failure::input(format!("{}: there are two effects `{id}`", file.display())));
+        }
+        effects.push(effect);
+    }
+    Ok(effects)
+}
+
 /// `cvg identify`: files where a folder is given, a summary or the report on standard output.
 pub(crate) fn identify(
     open: impl FnOnce() -> Result<Campaign, Failure>,
+    effects: Vec<EffectId>,
     out: Option<&Path>,
     json: bool,
     limits: Option<&Limits>,
@@ -57,7 +73,7 @@ pub(crate) fn identify(
     let inputs = input::sources(&opened);
     out.map_or(Ok(()), |out| output::check_folder_for(out, &RESULTS, &inputs))?;
     let about = About::campaign(&opened);
-    let options = Options { discover: true, progress: &|what| progress.say(what) };
+    let options = Options { effects, progress: &|what| progress.say(what), ..Options::default() };
     let told = match cvg_calibration::answer(opened, &options) {
         Ok(answer) => Told::of(&answer)?,
         Err(refusal) => {
@@ -154,7 +170,7 @@ fn refuse(refused: &Refused, out: Option<&Path>, inputs: &[PathBuf], json: bool)
 pub(crate) fn run(open: impl FnOnce() -> Result<Campaign, Failure>) -> Result<Identification, Failure> {
     let progress = Progress::begin();
     progress.say("reading");
-    let options = Options { discover: true, progress: &|what| progress.say(what) };
+    let options = Options { progress: &|what| progress.say(what), ..Options::default() };
     Ok(cvg_calibration::identify_with_plots(open()?, &options)?)
 }
 

@@ -30,6 +30,15 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
     Ok(())
 }
 
+/// Prints an effect of the library as an effect file.
+pub(crate) fn export(id: &str) -> Result<(), Failure> {
+    let effect = EffectId::from_id(id).ok_or_else(|| unknown(id))?;
+    let text = cvg_calibration::export(effect)?.to_text();
+    output::answer(&format!(
+        "# {id} as the library has it. Give it an id of its own before it competes with the library.\n{text}"
+    ))
+}
+
 fn unknown(id: &str) -> Failure {
     let ids: Vec<&str> = EffectId::ALL.iter().map(|e| e.description().id).collect();
     Failure::input(format!("the library has no effect `{id}`; it has {}", ids.join(", ")))

@@ -75,11 +75,12 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Inspect { files, mapping, plot, json } => {
             inspect::inspect(&files, &mapping.naming()?, plot.as_deref(), json)
         }
-        Command::Identify { campaign, out, json, mapping, holdout, settle, sensor, limits } => {
+        Command::Identify { campaign, out, json, mapping, holdout, settle, sensor, effect, limits } => {
             let naming = mapping.naming()?;
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
             let wanted = input::Wanted { naming: &naming, holdout: &holdout, settle_s: settle, sensor };
-            commands::identify(|| input::campaign(&campaign, &wanted), out.as_deref(), json, limits.as_ref())
+            let effects = commands::written(&effect)?;
+            commands::identify(|| input::campaign(&campaign, &wanted), effects, out.as_deref(), json, limits.as_ref())
         }
         Command::Fleet { campaigns, out, limits, json } => {
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
@@ -89,7 +90,8 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Compensate { calibration, recordings, out, device, mapping } => {
             compensate::compensate(&calibration, &recordings, &out, device.as_deref(), &mapping.naming()?)
         }
-        Command::Effects { effect, json, markdown } => library::effects(effect.as_deref(), json, markdown),
+        Command::Effects { export: Some(id), .. } => library::export(&id),
+        Command::Effects { effect, json, markdown, .. } => library::effects(effect.as_deref(), json, markdown),
         Command::Paper { out } => paper::paper(&out),
         Command::Completions { shell } => {
             let mut script = Vec::new();

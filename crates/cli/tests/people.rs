@@ -156,6 +156,29 @@ fn the_library_is_listed_as_its_descriptions_tell_it() {
 }
 
 #[test]
+fn an_effect_of_the_library_is_written_as_text_and_competes_under_another_name() {
+    let text = cvg_ok(&["effects", "--export", "detection-skew"]);
+    assert!(text.contains("\"y_c'\" = \"y_c + skew * x_c\""), "{text}");
+    assert_eq!(cvg(&["effects", "--export", "gremlins"]).status, 2);
+    let bench = Bench::small();
+    bench.write("my-effect.toml", &text);
+    let (campaign, effect) = (bench.campaign(), bench.path("my-effect.toml"));
+    let identify: Vec<&OsStr> =
+        ["identify".as_ref(), campaign.as_os_str(), "--effect".as_ref(), effect.as_os_str()].to_vec();
+    let refused = cvg(&identify);
+    assert_eq!(refused.status, 2);
+    assert!(
+        refused.stderr.contains("my-effect.toml: `detection-skew` is an effect of the library"),
+        "{}",
+        refused.stderr
+    );
+    bench.replace("my-effect.toml", "\"detection-skew\"", "\"my-skew\"");
+    assert_eq!(cvg(&identify).status, 0);
+    let twice = cvg(&[&identify[..], &identify[2..]].concat());
+    assert!(twice.status == 2 && twice.stderr.contains("two effects `my-skew`"), "{}", twice.stderr);
+}
+
+#[test]
 fn shells_complete_every_command() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script = cvg_ok(&["completions", shell]);

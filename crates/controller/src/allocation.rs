@@ -189,7 +189,7 @@ impl<T: Float> Allocation<T> {
 
 fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> {
     let description = id.description();
-    if description.stage != Stage::Actuation {
+    if description.stage != Stage::Actuation || !id.in_library() {
         return Err(ConfigError { parameter: description.id, expected: "an effect of the actuation" });
     }
     for (value, parameter) in values.iter().zip(description.parameters) {

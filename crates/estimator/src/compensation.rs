@@ -152,7 +152,7 @@ impl<T: Float> Affine<T> {
 
 fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> {
     let description = id.description();
-    if description.stage != Stage::Readout {
+    if description.stage != Stage::Readout || !id.in_library() {
         return Err(ConfigError { parameter: description.id, expected: "an effect of the readout" });
     }
     for (value, parameter) in values.iter().zip(description.parameters) {

@@ -30,19 +30,20 @@ impl Stages {
     /// Sorts `effects`, given in any order.
     pub fn new(effects: &[Setting]) -> Self {
         let mut stages = Self::default();
-        for &id in EffectId::ALL {
-            for setting in effects.iter().filter(|(e, _)| *e == id) {
-                let values = &setting.1;
-                let list = match id.description().stage {
-                    Stage::Input if follows_table(id, values) => &mut stages.table,
-                    Stage::Input => &mut stages.input,
-                    Stage::Mechanics if is_linear(|e| id.mechanics(values, e)) => &mut stages.linear,
-                    Stage::Mechanics => &mut stages.nonlinear,
-                    Stage::Actuation => &mut stages.actuation,
-                    Stage::Readout => &mut stages.readout,
-                };
-                list.push(*setting);
-            }
+        // what was written down as text acts after what the library has
+        let written = effects.iter().filter(|(id, _)| !id.in_library());
+        let library = EffectId::ALL.iter().flat_map(|id| effects.iter().filter(move |(e, _)| e == id));
+        for setting in library.chain(written) {
+            let (id, values) = setting;
+            let list = match id.description().stage {
+                Stage::Input if follows_table(*id, values) => &mut stages.table,
+                Stage::Input => &mut stages.input,
+                Stage::Mechanics if is_linear(|e| id.mechanics(values, e)) => &mut stages.linear,
+                Stage::Mechanics => &mut stages.nonlinear,
+                Stage::Actuation => &mut stages.actuation,
+                Stage::Readout => &mut stages.readout,
+            };
+            list.push(*setting);
         }
         stages
     }

@@ -64,6 +64,8 @@ pub(crate) struct Dataset {
     pub(crate) start: Hypothesis,
     pub(crate) ring_down_runs: Vec<crate::recording::Run>,
     pub(crate) warnings: Vec<String>,
+    /// effects as text, which compete with the library's
+    pub(crate) written: Vec<EffectId>,
     /// rms of the energy and the quadrature command per unit of amplitude, V/V
     pub(crate) command_rms: [f64; 2],
     /// force scale and its uncertainty as the amplitude tells it, where no ring-down does
@@ -139,6 +141,7 @@ impl Dataset {
             start,
             ring_down_runs,
             warnings,
+            written: Vec::new(),
             energy_balance: None,
             quadrature_balance: None,
             drive_is_free: false,

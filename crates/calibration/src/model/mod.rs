@@ -5,3 +5,4 @@ pub(crate) mod hypothesis;
 pub(crate) mod jet;
 pub(crate) mod prediction;
 pub(crate) mod unknowns;
+pub(crate) mod written;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Refusal;
 use crate::model::angle_table::AngleTable;
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
+use crate::model::written::EffectText;
 use crate::recording::Instrument;
 use crate::report::{Input, Tool};
 
@@ -91,6 +92,9 @@ struct EffectEntry {
     id: String,
     origin: Origin,
     parameters: std::collections::BTreeMap<String, f64>,
+    /// the effect itself, where it is not the library's
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    text: Option<String>,
 }
 
 impl Calibration {
@@ -123,6 +127,10 @@ impl Calibration {
                         .zip(m.values)
                         .map(|(p, v)| (p.name.to_string(), v))
                         .collect(),
+                    text: match m.id {
+                        EffectId::Written(written) => Some(written.text.to_owned()),
+                        _ => None,
+                    },
                 })
                 .collect(),
             rate_bias_rad_s: h.rate_bias_rad_s,
@@ -206,8 +214,19 @@ impl Calibration {
 }
 
 fn member(entry: &EffectEntry, name: &str) -> Result<Member, Refusal> {
-    let id = EffectId::from_id(&entry.id)
-        .ok_or_else(|| Refusal::new(name, format!("unknown effect \"{}\"", entry.id), "an effect of the library"))?;
+    let id = match &entry.text {
+        Some(text) => EffectText::parse(text, name)?.effect(name)?,
+        None => EffectId::from_id(&entry.id).ok_or_else(|| {
+            Refusal::new(name, format!("unknown effect \"{}\"", entry.id), "an effect of the library")
+        })?,
+    };
+    if id.description().id != entry.id {
+        return Err(Refusal::new(
+            name,
+            format!("\"{}\" has the text of {id}", entry.id),
+            "a calibration as cvg wrote it",
+        ));
+    }
     let parameters = id.description().parameters;
     let mut values = id.neutral::<f64>();
     for (key, value) in &entry.parameters {

@@ -172,6 +172,8 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
         let n = worth * count(&t.fit);
         t.gain = n * (mean_square(&base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
     }
+    // an effect as text may have no value where the refit led it
+    trials.retain(|t| t.gain.is_finite());
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let apart = Distinguishable {
         rates: dataset.tracks_differ(),

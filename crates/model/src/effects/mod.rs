@@ -29,6 +29,8 @@ pub mod scale_drift;
 pub mod spring_cubic;
 pub mod table_harmonic;
 pub mod time_periodic;
+#[cfg(feature = "written")]
+pub mod written;
 
 pub use detection_cubic::Cubic;
 
@@ -283,7 +285,12 @@ macro_rules! library {
         /// An effect of the library.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[allow(missing_docs, reason = "each variant is the effect of its name, documented in its own file")]
-        pub enum EffectId { $($name),+ }
+        pub enum EffectId {
+            $($name,)+
+            /// an effect outside the library, written down as text; a readout effect acts after all of the library's
+            #[cfg(feature = "written")]
+            Written(&'static written::Written),
+        }
 
         impl EffectId {
             /// Every effect; readout effects in the order in which a signal meets them.
@@ -291,52 +298,88 @@ macro_rules! library {
 
             /// What is known of it.
             pub const fn description(self) -> &'static Description {
-                match self { $(Self::$name => const { &<$effect as Effect>::DESCRIPTION }),+ }
+                match self {
+                    $(Self::$name => const { &<$effect as Effect>::DESCRIPTION },)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => &text.description,
+                }
             }
 
             /// [`Effect::IN_TIME`]
             pub const fn in_time(self) -> bool {
-                match self { $(Self::$name => const { <$effect as Effect>::IN_TIME }),+ }
+                match self {
+                    $(Self::$name => const { <$effect as Effect>::IN_TIME },)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.in_time,
+                }
             }
 
             /// [`Effect::SEEN_BY_LOOPS`]
             pub const fn seen_by_loops(self) -> bool {
-                match self { $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS }),+ }
+                match self {
+                    $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS },)+
+                    #[cfg(feature = "written")]
+                    Self::Written(_) => false,
+                }
             }
 
             /// [`Effect::input_rate`]
             #[inline]
             pub fn input_rate<T: Real>(self, p: &Values<T>, rate_rad_s: T, at: &Moment<T>) -> T {
-                match self { $(Self::$name => <$effect as Effect>::input_rate(p, rate_rad_s, at)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::input_rate(p, rate_rad_s, at),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.input_rate(p, rate_rad_s, at),
+                }
             }
 
             /// [`Effect::mechanics`]
             #[inline]
             pub fn mechanics<T: Real>(self, p: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
-                match self { $(Self::$name => <$effect as Effect>::mechanics(p, e)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::mechanics(p, e),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.mechanics(p, e),
+                }
             }
 
             /// [`Effect::actuate`]
             #[inline]
             pub fn actuate<T: Real>(self, p: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
-                match self { $(Self::$name => <$effect as Effect>::actuate(p, f)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::actuate(p, f),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.actuate(p, f),
+                }
             }
 
             /// [`Effect::read`]
             #[inline]
             pub fn read<T: Real>(self, p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
-                match self { $(Self::$name => <$effect as Effect>::read(p, e, at)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::read(p, e, at),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.read(p, e, at),
+                }
             }
 
             /// [`Effect::unread`]
             #[inline]
             pub fn unread<T: Real>(self, p: &Values<T>, e: Envelope<T>, at: &Moment<T>) -> Envelope<T> {
-                match self { $(Self::$name => <$effect as Effect>::unread(p, e, at)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::unread(p, e, at),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(text) => text.unread(p, e, at),
+                }
             }
 
             /// [`Effect::inverse`]
             pub fn inverse<T: Real>(self, p: &Values<T>) -> Inverse<T> {
-                match self { $(Self::$name => <$effect as Effect>::inverse(p)),+ }
+                match self {
+                    $(Self::$name => <$effect as Effect>::inverse(p),)+
+                    #[cfg(feature = "written")]
+                    Self::Written(_) => Inverse::Unread,
+                }
             }
         }
     };
@@ -346,6 +389,16 @@ impl EffectId {
     /// The effect called `id`, if the library has it.
     pub fn from_id(id: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|e| e.description().id == id)
+    }
+
+    /// Whether the library has it. One that was written down as text is none for the electronics to undo.
+    #[inline]
+    pub const fn in_library(self) -> bool {
+        #[cfg(feature = "written")]
+        if let Self::Written(_) = self {
+            return false;
+        }
+        true
     }
 
     /// Whether a readout effect is added to the angle of the vibration itself, before plates, axes, amplifier and converter.
