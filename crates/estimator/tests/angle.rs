@@ -144,6 +144,23 @@ fn the_direction_of_twice_the_angle_wants_a_direction_and_a_vibration_along_it()
     assert_eq!(of(&along_x, 1e200, 0.0), none(Status::Invalid));
 }
 
+#[test]
+fn a_state_of_no_number_is_held_as_zero_and_counts_nothing() {
+    for period in [Period::Pattern, Period::FullTurn] {
+        for within_rad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let state = AngleState { periods: 7, within_rad };
+            let mut held = state;
+            let reading = tracker(period).step(&mut held, &Envelope::zero());
+            assert_eq!((reading.periods, reading.within_rad), (7, 0.0), "{period:?}, no vibration, {within_rad}");
+            let mut known = state;
+            let line = Orbit { a: 1.0, q: 0.0, theta: 1.5, delta: 0.0 }.envelope();
+            let reading = tracker(period).step(&mut known, &line);
+            assert_eq!((reading.periods, reading.status), (7, Status::Valid), "{period:?}, a line, {within_rad}");
+            assert!((reading.within_rad - 1.5).abs() < 1e-12, "{period:?}: {}", reading.within_rad);
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn any_bit_pattern_gives_a_finite_reading_inside_its_period(

@@ -168,9 +168,13 @@ fn whatever_is_wrong_with_a_converter() {
 
 #[test]
 fn a_precession_so_slow_that_its_inverse_is_no_number() {
-    let mut script = running(20);
-    script.extend([Event::Stalled, Event::Well(1), Event::Stalled, Event::Well(40)]);
-    in_both_precisions(&script, &[Mode::WholeAngle]);
+    // where sin 2θ is positive the inverse stays where it is, where it is negative it ends beyond all numbers
+    for by in [0.0, -0.7] {
+        let mut script = running(20);
+        script.extend([Event::Jump(by), Event::Well(30)]);
+        script.extend([Event::Stalled, Event::Well(1), Event::Stalled, Event::Well(40)]);
+        in_both_precisions(&script, &[Mode::WholeAngle]);
+    }
 }
 
 #[test]
