@@ -7,6 +7,7 @@
 
 pub mod angle;
 pub mod demodulator;
+pub mod direction;
 pub mod oscillator;
 pub mod precession;
 

@@ -25,6 +25,9 @@
 #![forbid(unsafe_code)]
 
 pub mod continuity;
+mod drives;
+#[cfg(any(kani, test, cvg_prove))]
+pub mod proofs;
 pub mod settings;
 pub mod state;
 mod step;

@@ -9,6 +9,7 @@ use cvg_model::effects::Moment;
 use cvg_model::{AxisForces, ControlOutputs, Envelope, Float, Pendulum};
 
 use crate::continuity::{Continuity, Sight};
+use crate::drives::put_out;
 use crate::{Instrument, MOST_COMPENSATED, Seen, State, Status};
 
 #[cfg(test)]
@@ -39,6 +40,8 @@ impl<T: Float> Instrument<T> {
 
     //= specs/dsp.md#bounded-commands
     //# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+    //= specs/dsp.md#whole-step
+    //# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
     /// One sample: what the converters read, V, against what they are to put out next, V, and a status.
     ///
     /// Total: any bit pattern in; out come finite values within ±`dac_limit_v`.
@@ -60,7 +63,7 @@ impl<T: Float> Instrument<T> {
         if full {
             self.last(state, x, y, now.cos, now.sin)
         } else {
-            let (x, y) = self.put_out(&state.drive, now.cos, now.sin);
+            let (x, y) = put_out(self.dac_limit_v, &state.drive, now.cos, now.sin);
             (x, y, state.status)
         }
     }
@@ -208,7 +211,7 @@ impl<T: Float> Instrument<T> {
         state.phasor = phasor;
         state.window = Window::begin(&phasor);
         state.status = status;
-        let (x, y) = self.put_out(&drive, cos, sin);
+        let (x, y) = put_out(self.dac_limit_v, &drive, cos, sin);
         Some((x, y, Status { fresh: true, ..status }))
     }
 
@@ -217,21 +220,8 @@ impl<T: Float> Instrument<T> {
     #[inline(never)]
     fn otherwise(&self, state: &mut State<T>, suspicion: Suspicion, cos: T, sin: T) -> (T, T, Status) {
         state.status = self.control(state, suspicion);
-        let (x, y) = self.put_out(&state.drive, cos, sin);
+        let (x, y) = put_out(self.dac_limit_v, &state.drive, cos, sin);
         (x, y, Status { fresh: true, ..state.status })
-    }
-
-    /// The drives at the phase of (`cos`, `sin`).
-    #[inline(always)]
-    fn put_out(&self, d: &AxisForces<T>, cos: T, sin: T) -> (T, T) {
-        let (x, y) = (d.x_c * cos + d.x_s * sin, d.y_c * cos + d.y_s * sin);
-        if x.within(self.dac_limit_v) && y.within(self.dac_limit_v) { (x, y) } else { self.limited(x, y) }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn limited(&self, x: T, y: T) -> (T, T) {
-        (x.bounded(self.dac_limit_v), y.bounded(self.dac_limit_v))
     }
 
     /// The control step with the envelopes that `state.seen` has.

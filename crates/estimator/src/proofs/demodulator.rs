@@ -58,3 +58,47 @@ pub fn proof_samples_are_admitted_within_the_range_f32() {
 pub fn twin_samples_are_admitted_within_the_range_f32() {
     samples_are_admitted_within_the_range(0.5_f32);
 }
+
+fn a_window_ends<T: Float + Arbitrary>(fewer: u32) {
+    let (demodulator, _) = any_demodulator::<T>();
+    let left = |window: &Window<T>| {
+        let n = demodulator.samples();
+        if window.count < n { n - window.count } else { 1 }
+    };
+    let start = any_phasor::<T>();
+    let mut window = Window { count: kani::any(), ..Window::begin(&start) };
+    // precondition: not the last count of all, which the next sample makes the first
+    kani::assume(window.count < u32::MAX);
+    let before = left(&window);
+    let full = demodulator.accumulate(&mut window, kani::any(), kani::any(), &start);
+    kani::cover!(full, "full");
+    kani::cover!(!full && before > 9000, "far from it");
+    assert!(before >= 1 && before <= demodulator.samples());
+    if full {
+        kani::cover!(before == 1, "with the last");
+        assert!(before == 1 && window.count >= demodulator.samples());
+    } else {
+        kani::cover!(before == 2, "with the last but one");
+        assert!(left(&window) + fewer == before);
+    }
+}
+
+//= specs/dsp.md#bounded-commands
+//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// [`Demodulator::accumulate`], whatever a window has counted, is one sample nearer to a full one: within as many samples as a
+/// window has there is a control step.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_a_window_ends_f32() {
+    a_window_ends::<f32>(1);
+}
+
+/// Two samples are claimed to be taken.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_a_window_ends_f32() {
+    a_window_ends::<f32>(2);
+}

@@ -71,9 +71,9 @@ fn direction_ahead_is_bounded<T: Float + Arbitrary>(longest: T) {
         sin_2_per_window: kani::any(),
         half_turns: kani::any(),
     };
-    // precondition: a direction as `major_axis` gives it
-    let below_two = || kani::any_where(|v: &T| v.magnitude() <= T::two());
-    let ahead = precession.ahead(&state, &Direction { cos: below_two(), sin: below_two(), status: Status::Valid });
+    // precondition: a direction as `major_axis_of` gives it, which is proved beside
+    let bounded = || kani::any_where(|v: &T| v.magnitude() <= T::ratio(3, 1));
+    let ahead = precession.ahead(&state, &Direction { cos: bounded(), sin: bounded(), status: Status::Valid });
     let (_, within) = state.angle();
     kani::cover!(ahead.cos > T::one(), "turned ahead");
     assert!(ahead.cos.magnitude() <= longest && ahead.sin.magnitude() <= longest);

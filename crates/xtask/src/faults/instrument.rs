@@ -7,6 +7,7 @@ const JOINED: (&str, &str) = ("cvg-instrument", "composition");
 const SHORT_WAY: (&str, &str) = ("cvg-instrument", "--lib");
 
 const STEP: &str = "instrument/src/step.rs";
+const DRIVES: &str = "instrument/src/drives.rs";
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -54,16 +55,16 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "the second output has no limit",
-        STEP,
-        "if x.within(self.dac_limit_v) && y.within(self.dac_limit_v)",
-        "if x.within(self.dac_limit_v)",
+        DRIVES,
+        "if x.within(limit_v) && y.within(limit_v)",
+        "if x.within(limit_v)",
         OPEN_LOOP,
     ),
     fault(
         "the last window's drives are put out",
         STEP,
-        "let (x, y) = self.put_out(&drive, cos, sin);",
-        "let (x, y) = self.put_out(&state.drive.clone(), sin, cos);\n        let _ = drive;",
+        "let (x, y) = put_out(self.dac_limit_v, &drive, cos, sin);",
+        "let (x, y) = put_out(self.dac_limit_v, &state.drive.clone(), sin, cos);\n        let _ = drive;",
         SHORT_WAY,
     ),
     fault(

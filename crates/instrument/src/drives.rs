@@ -1,0 +1,21 @@
+//! What is put out: the drives at a phase of the carrier, within the converter's limit.
+
+use cvg_model::{AxisForces, Float};
+
+//= specs/dsp.md#bounded-commands
+//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+/// The drives of X and Y at the phase of (`cos`, `sin`), V, each within ±`limit_v`; 0 where that is no number.
+///
+/// Nothing is assumed of the drives or the phase: this is the last that a command passes, and what is bounded here is
+/// bounded whatever came before.
+#[inline(always)]
+pub(crate) fn put_out<T: Float>(limit_v: T, d: &AxisForces<T>, cos: T, sin: T) -> (T, T) {
+    let (x, y) = (d.x_c * cos + d.x_s * sin, d.y_c * cos + d.y_s * sin);
+    if x.within(limit_v) && y.within(limit_v) { (x, y) } else { limited(limit_v, x, y) }
+}
+
+#[cold]
+#[inline(never)]
+fn limited<T: Float>(limit_v: T, x: T, y: T) -> (T, T) {
+    (x.bounded(limit_v), y.bounded(limit_v))
+}
