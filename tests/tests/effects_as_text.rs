@@ -134,6 +134,7 @@ fn file(stage: &str, map: &[(String, String)]) -> String {
             })
             .to_vec(),
         map: map.iter().cloned().collect(),
+        law: None,
     };
     text.to_text()
 }

@@ -1,12 +1,14 @@
 //! Errors that are in no file of the library, put into recordings after the simulator made them: they come out as
-//! unexplained or as empirical, never as an effect of the library.
+//! unexplained or as empirical, never as an effect of the library, and as a law with an effect as text that reproduces it.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use cvg_calibration::{Identification, Origin};
+use cvg_calibration::recording::Campaign;
+use cvg_calibration::{Identification, Law, Options, Origin, identify};
 use cvg_model::Envelope;
 use cvg_simulator::scenario::Run;
 use cvg_simulator::{Scenario, Settings, Simulated, SimulatedRun};
-use cvg_tests::bench::{found, identify_folder, over_floor, plain_paper, scenario};
+use cvg_tests::bench::{found, identify_folder, over_floor, plain_paper, scenario, trials};
+use tempfile::TempDir;
 
 /// Size of the errors, rad: some 20 times the noise.
 const SIZE: f64 = 5e-4;
@@ -21,24 +23,62 @@ struct Sample {
     table: f64,
     /// direction of the vibration as read, rad
     theta: f64,
+    /// amplitude as read, V
+    a: f64,
 }
 
-fn write_and_identify(simulated: &Simulated) -> Identification {
+fn written(simulated: &Simulated) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     simulated.write(folder.path()).unwrap();
     std::fs::remove_file(folder.path().join("truth.toml")).unwrap();
-    identify_folder(folder.path()).unwrap()
+    folder
 }
 
 /// The device with `error` (rad) added to its angle in every rotation run.
-fn with_error(settings: Settings, error: impl Fn(&Sample) -> f64) -> Identification {
+fn recorded(settings: Settings, error: impl Fn(&Sample) -> f64) -> TempDir {
     let mut simulated = scenario(settings).simulate();
     for run in &mut simulated.runs {
         if matches!(run.run, Run::Rotation { .. }) {
             turn_readout(run, &error);
         }
     }
-    write_and_identify(&simulated)
+    written(&simulated)
+}
+
+fn with_error(settings: Settings, error: impl Fn(&Sample) -> f64) -> Identification {
+    identify_folder(recorded(settings, error).path()).unwrap()
+}
+
+/// The law that is proposed of `n`. Its text is an effect, with no name of the library.
+fn law(identified: &Identification, n: Option<f64>) -> &Law {
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-2;
+    let proposals = &identified.report.proposals;
+    for (number, proposal) in proposals.iter().enumerate() {
+        println!("{}", proposal.to_text());
+        assert_eq!(proposal.effect("proposal.toml").unwrap().to_string(), format!("proposal-{}", number + 1));
+    }
+    let of_n = |law: &&Law| law.n.is_some() == n.is_some() && law.n.zip(n).is_none_or(|(a, b)| near(a, b));
+    let laws: Vec<&Law> = proposals.iter().filter_map(|p| p.law.as_ref()).filter(of_n).collect();
+    assert_eq!(laws.len(), 1, "{proposals:#?}");
+    laws[0]
+}
+
+/// Checks what is proposed: what it follows, its order, its stage, and the exponents of rate and amplitude.
+fn is_proposed(identified: &Identification, follows: &str, n: Option<f64>, stage: &str, exponents: [Option<f64>; 2]) {
+    let law = law(identified, n);
+    assert_eq!((law.follows.as_str(), law.stage.as_str()), (follows, stage), "{law:#?}");
+    for (told, expected) in [law.rate, law.amplitude].into_iter().zip(exponents) {
+        let Some(expected) = expected else { continue };
+        let [low, high] = told.unwrap();
+        assert!((low..=high).contains(&expected), "{expected} is far from {low} to {high}: {law:#?}");
+    }
+}
+
+/// Identifies again, with everything that is proposed as effects of the user.
+fn fed_back(folder: &TempDir, identified: &Identification) -> Identification {
+    let effects = identified.report.proposals.iter().map(|p| p.effect(&p.id).unwrap()).collect();
+    let campaign = Campaign::open(&folder.path().join("campaign.toml")).unwrap();
+    identify(campaign, &Options { effects, ..Options::default() }).unwrap()
 }
 
 fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
@@ -63,7 +103,9 @@ fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
             let e = Envelope::new(xc[i], xs[i], yc[i], ys[i]);
             let next = (i + 1).clamp(1, t.len() - 1);
             let rate_rad_s = ((table[next] - table[next - 1]) / (t[next] - t[next - 1])).to_radians();
-            let sample = Sample { rate_rad_s, t_s: t[i], table: table[i].to_radians(), theta: e.y_c.atan2(e.x_c) };
+            let theta = e.y_c.atan2(e.x_c);
+            let a = e.pendulum().e.sqrt();
+            let sample = Sample { rate_rad_s, t_s: t[i], table: table[i].to_radians(), theta, a };
             let (sin, cos) = error(&sample).sin_cos();
             e.turned(sin, cos)
         })
@@ -103,6 +145,7 @@ fn a_table_with_sixteen_teeth_is_described_and_not_explained() {
     let identified = with_error(plain_paper(), |s| SIZE * (16.0 * s.table + 0.7).sin());
     is_left_unexplained(&identified, "table-harmonic", Some(16));
     is_corrected(&identified);
+    is_proposed(&identified, "table", Some(16.0), "input", [Some(0.0), Some(0.0)]);
 }
 
 #[test]
@@ -110,6 +153,7 @@ fn a_bearing_of_the_table_is_described_and_not_explained() {
     let identified = with_error(plain_paper(), |s| SIZE * (3.57 * s.table + 0.7).sin());
     is_left_unexplained(&identified, "table-harmonic", None);
     is_corrected(&identified);
+    is_proposed(&identified, "table", Some(3.57), "input", [Some(0.0), Some(0.0)]);
 }
 
 #[test]
@@ -117,6 +161,7 @@ fn a_phase_that_depends_on_the_direction_is_not_taken_for_a_spring_or_a_cubic_re
     let identified = with_error(plain_paper(), |s| SIZE * (4.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos());
     is_left_unexplained(&identified, "rate-dependent", Some(4));
     is_corrected(&identified);
+    is_proposed(&identified, "pattern", Some(4.0), "readout", [Some(0.0), Some(0.0)]);
 }
 
 #[test]
@@ -124,6 +169,7 @@ fn a_phase_that_depends_on_the_direction_is_not_taken_for_a_skew() {
     let identified = with_error(plain_paper(), |s| SIZE * (2.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos());
     is_left_unexplained(&identified, "rate-dependent", Some(2));
     is_corrected(&identified);
+    is_proposed(&identified, "pattern", Some(2.0), "readout", [Some(0.0), Some(0.0)]);
 }
 
 #[test]
@@ -131,6 +177,7 @@ fn a_harmonic_that_grows_with_the_rate_is_described_and_not_explained() {
     let identified = with_error(plain_paper(), |s| SIZE * (4.0 * s.theta + 0.5).cos() * s.rate_rad_s / 8.7);
     is_left_unexplained(&identified, "rate-dependent", Some(4));
     is_corrected(&identified);
+    is_proposed(&identified, "pattern", Some(4.0), "readout", [Some(1.0), Some(0.0)]);
 }
 
 #[test]
@@ -138,6 +185,7 @@ fn a_third_harmonic_is_described_and_not_explained() {
     let identified = with_error(plain_paper(), |s| SIZE * (3.0 * s.theta + 0.5).cos());
     is_left_unexplained(&identified, "pattern-harmonic", Some(3));
     is_corrected(&identified);
+    is_proposed(&identified, "pattern", Some(3.0), "readout", [Some(0.0), Some(0.0)]);
 }
 
 /// The angle error of a cubic readout without the amplitude that a cubic readout would show.
@@ -146,12 +194,14 @@ fn a_fourth_harmonic_that_the_energy_balance_contradicts_is_not_a_cubic_readout(
     let identified = with_error(plain_paper(), |s| -SIZE * (4.0 * s.theta).sin());
     is_left_unexplained(&identified, "pattern-harmonic", Some(4));
     is_corrected(&identified);
+    is_proposed(&identified, "pattern", Some(4.0), "readout", [Some(0.0), Some(0.0)]);
 }
 
 #[test]
 fn a_settling_angle_is_a_drift() {
     let identified = with_error(plain_paper(), |s| 4.0 * SIZE * (-s.t_s / 4.0).exp());
     is_left_unexplained(&identified, "drift", None);
+    is_proposed(&identified, "time", None, "readout", [None, None]);
 }
 
 /// A sensor that turns there and back at two speeds; its angle lags by a constant, whichever way it goes.
@@ -240,7 +290,64 @@ fn a_rotation_that_was_not_recorded_is_no_fault_of_the_instrument() {
             *v -= OFFSET_DPS;
         }
     }
-    let identified = write_and_identify(&simulated);
+    let identified = identify_folder(written(&simulated).path()).unwrap();
     assert_eq!(found(&identified, Origin::Discovered), Vec::<&str>::new(), "{:#?}", identified.steps);
     is_corrected(&identified);
+    is_proposed(&identified, "time", None, "input", [None, None]);
+}
+
+/// A map of the user that goes with the square of the amplitude: what comes out, fed back, is found by its own name.
+#[test]
+fn a_sixth_harmonic_of_a_nonlinear_readout_is_proposed_with_its_amplitude() {
+    let folder = recorded(plain_paper(), |s| SIZE * s.a.powi(2) * (6.0 * s.theta + 0.4).cos());
+    let identified = identify_folder(folder.path()).unwrap();
+    is_left_unexplained(&identified, "pattern-harmonic", Some(6));
+    is_proposed(&identified, "pattern", Some(6.0), "readout", [Some(0.0), Some(2.0)]);
+    let again = fed_back(&folder, &identified);
+    assert_eq!(found(&again, Origin::Discovered), ["proposal-1"], "{:#?}", again.steps);
+    is_corrected(&again);
+}
+
+#[test]
+fn an_eighth_harmonic_with_the_fourth_power_of_the_amplitude_is_proposed_as_such() {
+    let identified = with_error(plain_paper(), |s| SIZE * s.a.powi(4) * (8.0 * s.theta).sin());
+    is_left_unexplained(&identified, "pattern-harmonic", Some(8));
+    is_proposed(&identified, "pattern", Some(8.0), "readout", [Some(0.0), Some(4.0)]);
+}
+
+#[test]
+fn a_sixth_harmonic_against_the_rate_is_proposed_as_mechanics() {
+    let identified = with_error(plain_paper(), |s| SIZE * (6.0 * s.theta).sin() / s.rate_rad_s);
+    is_left_unexplained(&identified, "rate-dependent", Some(6));
+    is_proposed(&identified, "pattern", Some(6.0), "mechanics", [Some(-1.0), Some(0.0)]);
+}
+
+#[test]
+fn a_first_harmonic_that_is_no_offset_is_proposed_without_the_amplitude() {
+    let identified = with_error(plain_paper(), |s| SIZE * (s.theta + 0.9).cos());
+    is_left_unexplained(&identified, "pattern-harmonic", Some(1));
+    is_proposed(&identified, "pattern", Some(1.0), "readout", [Some(0.0), Some(0.0)]);
+}
+
+/// What is proposed, fed back, corrects the angle: one kind always, all of them with CVG_TRIALS=7.
+#[test]
+fn proposals_that_are_fed_back_correct_the_angle() {
+    type Error = fn(&Sample) -> f64;
+    let kinds: [Error; 7] = [
+        |s| SIZE * (4.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos(),
+        |s| SIZE * (16.0 * s.table + 0.7).sin(),
+        |s| SIZE * (4.0 * s.theta + 0.5).cos() * s.rate_rad_s / 8.7,
+        |s| 4.0 * SIZE * (-s.t_s / 4.0).exp(),
+        |s| SIZE * (6.0 * s.theta).sin() / s.rate_rad_s,
+        |s| SIZE * (3.0 * s.theta + 0.5).cos(),
+        |s| SIZE * s.a.powi(4) * (8.0 * s.theta).sin(),
+    ];
+    let count = usize::try_from(trials(1)).unwrap();
+    for (number, error) in kinds.into_iter().enumerate().take(count) {
+        let folder = recorded(plain_paper(), error);
+        let again = fed_back(&folder, &identify_folder(folder.path()).unwrap());
+        println!("kind {number}: {:?}, {} times the floor", found(&again, Origin::Discovered), over_floor(&again));
+        assert_eq!(found(&again, Origin::Discovered), ["proposal-1"], "{:#?}", again.steps);
+        is_corrected(&again);
+    }
 }

@@ -23,6 +23,7 @@ use crate::recording::{Campaign, Instrument, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
+use crate::report::proposals::proposals;
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
@@ -220,6 +221,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
         run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
     }
     let mut unexplained = unexplained(&dataset, &on_fit, &dense(Role::Fit), &after, noise_floor);
+    let proposals = proposals(&dataset, &fitted.fit, &on_fit, &left, &unexplained);
     unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
     let facts = Facts {
         instrument: dataset.instrument,
@@ -262,7 +264,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
         unexplained,
         runs,
         decomposition: Vec::new(),
-        proposals: Vec::new(),
+        proposals,
         scale_factor,
         allan: None,
         decay: None,

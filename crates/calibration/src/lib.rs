@@ -59,7 +59,7 @@ pub use identification::{BiasCurve, Figures, Identification, Options, identify, 
 pub use model::angle_table::{AngleTable, Form};
 pub use model::hypothesis::{ChannelClip, Hypothesis, Member, Origin, Unknown};
 pub use model::written::export::export;
-pub use model::written::{EffectText, ParameterText};
+pub use model::written::{EffectText, Law, ParameterText};
 pub use report::calibration;
 pub use report::compensate::{compensate, left_out, outside};
 pub use selection::discovery;

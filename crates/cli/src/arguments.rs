@@ -158,7 +158,7 @@ pub(crate) enum Command {
         /// input
         #[arg(required = true, value_name = "CAMPAIGN")]
         campaign: Vec<PathBuf>,
-        /// Folder for report.json, report.html and calibration.toml; without it only the summary is printed
+        /// Folder for report.json, report.html, calibration.toml and proposals; without it only the summary is printed
         #[arg(long)]
         out: Option<PathBuf>,
         /// Print report.json and nothing else to standard output

@@ -44,8 +44,19 @@ fn scenario_problem(error: &ScenarioError, text: &str) -> String {
     format!("line {line}, column {column}: {message}")
 }
 
+/// Effects as text, and the files that they were read from.
+pub(crate) struct Written {
+    effects: Vec<EffectId>,
+    files: Vec<PathBuf>,
+}
+
+/// The files that proposals may be in: more than an identification has effects.
+fn proposal_names() -> Vec<String> {
+    (1..=16).map(|number| format!("proposal-{number}.toml")).collect()
+}
+
 /// Effects as text, each by a name of its own.
-pub(crate) fn written(files: &[PathBuf]) -> Result<Vec<EffectId>, Failure> {
+pub(crate) fn written(files: &[PathBuf]) -> Result<Written, Failure> {
     let mut effects: Vec<EffectId> = Vec::new();
     for file in files {
         let effect = EffectText::read(file)?.effect(&file.display().to_string())?;
@@ -55,13 +66,13 @@ pub(crate) fn written(files: &[PathBuf]) -> Result<Vec<EffectId>, Failure> {
         }
         effects.push(effect);
     }
-    Ok(effects)
+    Ok(Written { effects, files: files.to_vec() })
 }
 
 /// `cvg identify`: files where a folder is given, a summary or the report on standard output.
 pub(crate) fn identify(
     open: impl FnOnce() -> Result<Campaign, Failure>,
-    effects: Vec<EffectId>,
+    effects: Written,
     out: Option<&Path>,
     json: bool,
     limits: Option<&Limits>,
@@ -70,8 +81,12 @@ pub(crate) fn identify(
     let progress = Progress::begin();
     progress.say("reading");
     let opened = open()?;
-    let inputs = input::sources(&opened);
-    out.map_or(Ok(()), |out| output::check_folder_for(out, &RESULTS, &inputs))?;
+    let mut inputs = input::sources(&opened);
+    inputs.extend(effects.files);
+    let effects = effects.effects;
+    let proposals = proposal_names();
+    let names: Vec<&str> = RESULTS.into_iter().chain(proposals.iter().map(String::as_str)).collect();
+    out.map_or(Ok(()), |out| output::check_folder_for(out, &names, &inputs))?;
     let about = About::campaign(&opened);
     let options = Options { effects, progress: &|what| progress.say(what), ..Options::default() };
     let told = match cvg_calibration::answer(opened, &options) {
@@ -94,6 +109,11 @@ pub(crate) fn identify(
             Some(text) => set.add(calibration, text.as_bytes())?,
             None => set.take_away(&[calibration]),
         }
+        for (name, text) in &told.proposals {
+            set.add(name, text.as_bytes())?;
+        }
+        let stale = proposals.iter().filter(|name| !told.proposals.iter().any(|(n, _)| n == *name));
+        set.take_away(&stale.map(String::as_str).collect::<Vec<_>>());
         set.commit()?;
         output::tell(format_args!("wrote {}", out.join("report.html").display()));
     }
@@ -113,6 +133,8 @@ pub(crate) struct Told {
     json: String,
     page: String,
     calibration: Option<String>,
+    /// names and texts of effect files
+    proposals: Vec<(String, String)>,
     summary: String,
     /// why nothing is undone, where nothing is
     reason: Option<String>,
@@ -137,13 +159,16 @@ impl Told {
                 let page = report::page(identified)?;
                 let reason = identified.report.reason.clone();
                 let device = identified.report.device.clone();
-                Ok(Self { device, json, page, calibration, summary: summary(identified), reason })
+                let file = |p: &EffectText| (format!("{}.toml", p.id), p.to_text());
+                let proposals = identified.report.proposals.iter().map(file).collect();
+                Ok(Self { device, json, page, calibration, proposals, summary: summary(identified), reason })
             }
             Answer::Surveyed(surveyed) => Ok(Self {
                 device: surveyed.report.device.clone(),
                 page: report::survey::page(surveyed)?,
                 json,
                 calibration,
+                proposals: Vec::new(),
                 summary: report::survey::summary(&surveyed.report),
                 reason: surveyed.report.reason.clone(),
             }),

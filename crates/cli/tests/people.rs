@@ -10,6 +10,8 @@ use std::io::Write as _;
 use std::process::{Command, Stdio};
 
 use cvg_model::effects::EffectId;
+use cvg_simulator::Scenario;
+use cvg_simulator::scenario::EffectSetting;
 use serde_json::Value;
 use support::{Bench, cvg, cvg_ok, foreign};
 use tempfile::TempDir;
@@ -176,6 +178,38 @@ fn an_effect_of_the_library_is_written_as_text_and_competes_under_another_name()
     assert_eq!(cvg(&identify).status, 0);
     let twice = cvg(&[&identify[..], &identify[2..]].concat());
     assert!(twice.status == 2 && twice.stderr.contains("two effects `my-skew`"), "{}", twice.stderr);
+}
+
+#[test]
+fn what_has_no_name_is_proposed_as_text_and_found_by_it_when_it_is_fed_back() {
+    let mut settings = Scenario::paper().settings().clone();
+    // with equal gains it is the same whether it acts before them or, as a text does, after
+    settings.effects.retain(|e| ![EffectId::DetectionCubic, EffectId::DetectionGainMismatch].contains(&e.id));
+    settings.effects.push(EffectSetting::new(EffectId::HarmonicN, [6.0, 5e-4, 0.0, 0.0]).unwrap());
+    let bench = Bench::simulated(settings);
+    let (campaign, results) = (bench.campaign(), bench.path("results"));
+    let identify = |more: &[&OsStr]| {
+        cvg(&[&["identify".as_ref(), campaign.as_os_str(), "--out".as_ref(), results.as_os_str()], more].concat())
+    };
+    assert_eq!(identify(&[]).status, 0);
+    let report = json(&bench.read("results/report.json"));
+    assert_eq!(
+        (report["proposals"][0]["id"].as_str(), report["proposals"][0]["law"]["n"].as_f64()),
+        (Some("proposal-1"), Some(6.0))
+    );
+    assert!(bench.read("results/report.html").contains("harmonic 6 of the pattern angle, without a known cause"));
+    let proposal = bench.path("results/proposal-1.toml");
+    // what is read is not written over, nor taken away
+    let refused = identify(&["--effect".as_ref(), proposal.as_os_str()]);
+    assert!(refused.status == 2 && refused.stderr.contains("is read by this command"), "{}", refused.stderr);
+    let mine = bench.path("mine.toml");
+    fs::rename(&proposal, &mine).unwrap();
+    bench.write("results/proposal-2.toml", "of another day");
+    assert_eq!(identify(&["--effect".as_ref(), mine.as_os_str()]).status, 0);
+    let report = json(&bench.read("results/report.json"));
+    let ids: Vec<&str> = report["effects"].as_array().unwrap().iter().filter_map(|e| e["id"].as_str()).collect();
+    assert!(ids.contains(&"proposal-1") && report["proposals"].as_array().unwrap().is_empty(), "{ids:?}");
+    assert!(!proposal.exists() && !bench.path("results/proposal-2.toml").exists());
 }
 
 #[test]

@@ -101,6 +101,11 @@ pub(crate) fn channels(dataset: &Dataset, fit: &Fit, stage: &str, angle: &Evalua
     all.into_par_iter().map(|(name, unit, evaluation)| analysis(stage, name, unit, evaluation, &amplitudes)).collect()
 }
 
+/// The mean amplitude of each fitted segment.
+pub(crate) fn amplitudes(dataset: &Dataset, fit: &Fit) -> Vec<f64> {
+    left(dataset, fit, &fit.hypothesis, &[]).1
+}
+
 /// What is left of each channel in the fitted segments, and the mean amplitude of each segment.
 fn left(dataset: &Dataset, fit: &Fit, closed: &Hypothesis, channels: &[Channel]) -> (Vec<Evaluation>, Vec<f64>) {
     let none = Unknowns::new(closed, Vec::new());

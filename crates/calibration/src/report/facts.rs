@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::diagnostics::evaluate::ErrorSize;
 use crate::diagnostics::residual::{Follows, Harmonic};
 use crate::model::hypothesis::Origin;
+use crate::model::written::EffectText;
 
 /// Identifier of the report's format.
 pub const SCHEMA: &str = "cvg.report/2";
@@ -415,7 +416,7 @@ pub struct Report {
     /// what the declared residual follows, by shares of its variance; empty where it was not taken apart
     pub decomposition: Vec<Share>,
     /// effects that are proposed for the library, each in the form of an effect file
-    pub proposals: Vec<serde_json::Value>,
+    pub proposals: Vec<EffectText>,
     /// how the scale factor goes with the rate; null where fewer than three rates of both senses are there
     pub scale_factor: Option<ScaleFactor>,
     /// how far the angle wanders at rest; null without a run at rest

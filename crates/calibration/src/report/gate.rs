@@ -153,7 +153,8 @@ fn at_its_limit(member: &Member) -> Option<String> {
     let parameters = member.id.description().parameters.iter().zip(member.values).zip(neutral);
     #[allow(clippy::float_cmp, reason = "a bound is reached exactly")]
     parameters
-        .filter(|((p, _), _)| !matches!(p.role, ParameterRole::Searched(_) | ParameterRole::Located(_)))
+        // what was chosen from a list is where the list has it
+        .filter(|((p, _), _)| matches!(p.role, ParameterRole::Fitted | ParameterRole::Refined))
         .find(|((p, value), neutral)| value != neutral && (*value == p.lower || *value == p.upper))
         .map(|((p, _), _)| format!("{} of {}", p.name, member.id))
 }

@@ -151,6 +151,7 @@ fn left(h: &mut String, r: &Report) {
             }
         });
     }
+    proposals(h, r);
     if !r.channels.is_empty() {
         let columns = ["channel", "stage", "rms", "unit", "memory", "line in time [Hz]", "slow change, rms"];
         table(h, "Channels of the fitted runs", &columns, |h| {
@@ -199,6 +200,37 @@ fn files(h: &mut String, r: &Report) {
             let dropped = if x.dropped.is_empty() { "none".into() } else { escape(&x.dropped.join("; ")) };
             let rows = x.rows.to_string();
             row(h, &[&escape(&run_name(&x.file)), &x.kind, &x.r#use, &rows, &rate, &tau, &dropped]);
+        }
+    });
+}
+
+/// What is described and not explained, as laws.
+fn proposals(h: &mut String, r: &Report) {
+    if r.proposals.is_empty() {
+        return;
+    }
+    let columns = ["proposal", "what it is", "size [deg]", "goes with", "channels", "stage that this means"];
+    table(h, "Laws without a cause, each with an effect as text that reproduces it", &columns, |h| {
+        for p in &r.proposals {
+            let Some(law) = &p.law else { continue };
+            let power = |of: &str, e: Option<[f64; 2]>| e.map(|[low, high]| format!("{of}^({low:.2} … {high:.2})"));
+            let turns = law.turns_with_direction.filter(|t| *t).map(|_| "the direction".to_owned());
+            let goes = [power("rate", law.rate), power("amplitude", law.amplitude), turns];
+            let goes: Vec<String> = goes.into_iter().flatten().collect();
+            let stage = format!("{}: {}", law.stage, law.meaning);
+            let size = format!("{:.5}", law.size_deg);
+            let channels = law.channels.join(", ");
+            row(
+                h,
+                &[
+                    &escape(&p.id),
+                    &escape(&p.summary),
+                    &size,
+                    &escape(&goes.join(", ")),
+                    &escape(&channels),
+                    &escape(&stage),
+                ],
+            );
         }
     });
 }

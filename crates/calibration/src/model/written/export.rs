@@ -54,8 +54,15 @@ pub fn export(id: EffectId) -> Result<EffectText, Refusal> {
         })
         .collect();
     let stage = stage_name(d.stage).to_owned();
-    let text =
-        EffectText { id: d.id.into(), summary: d.title.into(), stage, onsets: d.onsets.to_vec(), parameter, map };
+    let text = EffectText {
+        id: d.id.into(),
+        summary: d.title.into(),
+        stage,
+        onsets: d.onsets.to_vec(),
+        parameter,
+        map,
+        law: None,
+    };
     match text.compiled() {
         Ok(_) => Ok(text),
         Err(problem) => refuse(&problem),

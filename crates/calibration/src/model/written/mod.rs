@@ -71,6 +71,40 @@ pub struct EffectText {
     pub parameter: Vec<ParameterText>,
     /// what is given a value, and the expression of it
     pub map: BTreeMap<String, String>,
+    /// what was seen, where the text is a proposal; nothing is computed from it
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<Law>,
+}
+
+/// What was seen of something that no effect explains.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Law {
+    /// pattern, table, time, direction or other
+    pub follows: String,
+    /// harmonic of the pattern, or order of the table
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub n: Option<f64>,
+    /// frequency, Hz
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frequency_hz: Option<f64>,
+    /// amplitude, deg
+    pub size_deg: f64,
+    /// 95 % interval of the exponent of the rate; absent where the runs have one
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<[f64; 2]>,
+    /// 95 % interval of the exponent of the amplitude; absent where the runs have one
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub amplitude: Option<[f64; 2]>,
+    /// it changes its sign with the direction; absent where the runs have one
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turns_with_direction: Option<bool>,
+    /// channels in which it shows under the declared model
+    pub channels: Vec<String>,
+    /// the stage that this means
+    pub stage: String,
+    /// why
+    pub meaning: String,
 }
 
 /// A parameter of an effect as text.
@@ -141,6 +175,11 @@ impl EffectText {
     pub fn to_text(&self) -> String {
         // every field is a plain value: serialisation has nothing to fail on
         toml::to_string(self).unwrap_or_default()
+    }
+
+    /// Its expressions are right and its numbers finite.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.compiled().is_ok() && self.law.as_ref().is_none_or(|law| law.size_deg.is_finite())
     }
 
     /// The effect, to be given to an identification; `source` says where it was written. It is kept as long as the program
