@@ -1,21 +1,21 @@
 //! The instrument on a Cortex-M4F under QEMU: it is given what the converters read in a recording of the host, and has to
 //! answer with the same bits; and it counts its instructions.
 //!
-//! QEMU runs one instruction per [`TICKS`]/[`PER`] ticks of SysTick (`-icount`), so that SysTick counts instructions.
-//! That it does is measured first. What is counted is a call: with its prologue, and with the loads and stores of its state.
+//! That SysTick counts instructions is measured first. What is counted is a call: with its prologue, and with the loads and stores of its state.
 #![no_std]
 #![no_main]
 
+mod meter;
 mod scalar;
 mod scenario;
 
-use core::arch::asm;
 use core::hint::black_box;
 
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use cortex_m::peripheral::SYST;
 use cortex_m_rt::entry;
-use cortex_m_semihosting::{debug, hprintln};
+use cortex_m_semihosting::hprintln;
 use cvg_instrument::{Instrument, Mode, State, Status};
+use meter::{Count, between};
 use scalar::Single;
 use scenario::{RECORDINGS, settings, word};
 
@@ -26,46 +26,6 @@ const APART: usize = 0x0080_0000;
 /// Words of a sample in a recording: what the converters read, what is put out, and the status.
 const WORDS: usize = 5;
 
-/// Ticks of SysTick at 25 MHz for [`PER`] instructions of 2⁷ ns.
-const TICKS: u32 = 16;
-const PER: u32 = 5;
-
-#[panic_handler]
-fn panicked(info: &core::panic::PanicInfo<'_>) -> ! {
-    hprintln!("{}", info);
-    debug::exit(debug::EXIT_FAILURE);
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-/// Instructions from one reading of SysTick to the next.
-fn between(before: u32, after: u32) -> u32 {
-    let ticks = before.wrapping_sub(after) & 0x00ff_ffff;
-    (ticks * PER + TICKS / 2) / TICKS
-}
-
-/// How many instructions calls took.
-#[derive(Clone, Copy, Default)]
-struct Count {
-    calls: u32,
-    instructions: u32,
-    most: u32,
-}
-
-impl Count {
-    fn add(&mut self, instructions: u32) {
-        self.calls += 1;
-        self.instructions += instructions;
-        self.most = self.most.max(instructions);
-    }
-
-    /// Mean in tenths.
-    fn tenths(&self) -> u32 {
-        (self.instructions * 10 + self.calls / 2) / self.calls.max(1)
-    }
-}
-
 /// What an interrupt of the converter would do.
 #[inline(never)]
 fn sample(i: &Instrument<Single>, state: &mut State<Single>, x: Single, y: Single) -> (Single, Single, Status) {
@@ -74,25 +34,7 @@ fn sample(i: &Instrument<Single>, state: &mut State<Single>, x: Single, y: Singl
 
 #[entry]
 fn main() -> ! {
-    let Some(mut board) = cortex_m::Peripherals::take() else { panic!("no board") };
-    board.SYST.set_clock_source(SystClkSource::Core);
-    board.SYST.set_reload(0x00ff_ffff);
-    board.SYST.clear_current();
-    board.SYST.enable_counter();
-
-    let empty = {
-        let before = SYST::get_current();
-        between(before, SYST::get_current())
-    };
-    let thousand = {
-        let before = SYST::get_current();
-        // SAFETY: does nothing, a thousand times
-        unsafe { asm!(".rept 1000", "nop", ".endr") };
-        between(before, SYST::get_current()) - empty
-    };
-    hprintln!("meter: 1000 instructions count {}", thousand);
-    let mut wrong = u32::from(thousand != 1000);
-
+    let (empty, mut wrong) = meter::start();
     for (k, name) in RECORDINGS.iter().enumerate() {
         let start = (RECORDED + k * APART) as *const u32;
         // SAFETY: QEMU has loaded a recording there: its length, and as many samples
@@ -102,11 +44,7 @@ fn main() -> ! {
         };
         wrong += run(name, k, samples, empty);
     }
-    hprintln!("{}", if wrong == 0 { "all alike" } else { "not alike" });
-    debug::exit(if wrong == 0 { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
+    meter::end(wrong == 0)
 }
 
 /// Answers the recording; how many samples are answered otherwise.

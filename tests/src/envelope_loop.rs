@@ -1,6 +1,8 @@
 //! A closed loop of its own at the level of the envelope: resonator, readout, loops and drives, with the calibrator in
 //! it. Double precision, whatever the calibrator's; nothing here knows how the calibrator works.
 
+pub mod lives;
+
 use std::f64::consts::{PI, TAU};
 
 use cvg_calibrator::{Calibrator, Commands, Health, Settings, State};
@@ -46,6 +48,8 @@ pub struct Device {
     pub noise: f64,
     /// of the ratio, relative, 1/s
     pub drift_per_s: f64,
+    /// random walk of ratio and skew, 1/√s
+    pub wander: f64,
 }
 
 impl Device {
@@ -70,6 +74,7 @@ impl Device {
             force_phase: u(-5e-3, 5e-3),
             noise: 10f64.powf(u(-5.0, -4.0)),
             drift_per_s: 0.0,
+            wander: 0.0,
         }
     }
 
@@ -98,13 +103,17 @@ impl Device {
         }
     }
 
-    /// What the readout makes of an envelope at a time, without noise.
-    pub fn read(&self, e: &Envelope<f64>, t: f64) -> Envelope<f64> {
+    /// What the readout makes of an envelope, without noise.
+    pub fn read(&self, e: &Envelope<f64>) -> Envelope<f64> {
+        self.read_by((self.ratio, self.skew), e)
+    }
+
+    /// The same with another ratio and skew.
+    fn read_by(&self, (ratio, skew): (f64, f64), e: &Envelope<f64>) -> Envelope<f64> {
         let mx = 1.0 + 0.75 * self.cubic * (e.x_c * e.x_c + e.x_s * e.x_s);
         let my = 1.0 + 0.75 * self.cubic * (e.y_c * e.y_c + e.y_s * e.y_s);
         let (xc, xs, yc, ys) = (e.x_c * mx, e.x_s * mx, e.y_c * my, e.y_s * my);
-        let g = self.ratio * (1.0 + self.drift_per_s * t);
-        let (yc, ys) = (g * (yc + self.skew * xc), g * (ys + self.skew * xs));
+        let (yc, ys) = (ratio * (yc + skew * xc), ratio * (ys + skew * xs));
         // X e^{−iφ}, X = x_c − i x_s
         let turn = |c: f64, s: f64, phi: f64| {
             let (sin, cos) = phi.sin_cos();
@@ -166,6 +175,8 @@ pub struct Loop<'a, T> {
     pub rotation: f64,
     explained: f64,
     still: (Resonator<f64>, Resonator<f64>),
+    /// what ratio and skew have wandered
+    wandered: (f64, f64),
 }
 
 impl<'a, T: Float> Loop<'a, T> {
@@ -188,6 +199,7 @@ impl<'a, T: Float> Loop<'a, T> {
             rotation: theta,
             explained: 0.0,
             still: (device.resonator(false), device.resonator(true)),
+            wandered: (0.0, 0.0),
         }
     }
 
@@ -208,10 +220,26 @@ impl<'a, T: Float> Loop<'a, T> {
         z * self.device.noise
     }
 
+    /// Ratio and skew of the readout by now.
+    pub fn detection(&self) -> (f64, f64) {
+        let d = self.device;
+        let ratio = d.ratio * (1.0 + d.drift_per_s * self.t) + self.wandered.0;
+        (ratio, d.skew + self.wandered.1)
+    }
+
+    fn wander(&mut self) {
+        let by = self.device.wander * CONTROL_S.sqrt() / self.device.noise;
+        self.wandered.0 += by * self.normal();
+        self.wandered.1 += by * self.normal();
+    }
+
     /// One control step. Learns only where `learning`.
     pub fn step(&mut self, now: Moment, learning: bool) {
         let dt = CONTROL_S;
-        let raw = self.device.read(&self.plant, self.t);
+        if self.device.wander > 0.0 {
+            self.wander();
+        }
+        let raw = self.device.read_by(self.detection(), &self.plant);
         let raw = Envelope::new(
             raw.x_c + self.normal(),
             raw.x_s + self.normal(),
@@ -347,101 +375,4 @@ fn harmonics_rms(series: &[(f64, f64, f64)]) -> f64 {
         base = fit[..2].to_vec();
     }
     (0.5 * fit[2..].iter().map(|v| v * v).sum::<f64>()).sqrt().to_degrees()
-}
-
-/// What a device lives through.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Life {
-    /// at rest for ever
-    Rest,
-    /// at rest, turned by hand for ten seconds after five minutes, 30 to 90 deg/s
-    RestThenHand,
-    /// 0 to 300 deg/s, another rate every three seconds
-    Turning,
-    /// two minutes at rest, then 1 to 10 deg/s, another rate every five seconds
-    RestThenSlow,
-    /// the same without the rest
-    Slow,
-    /// at rest, a second split after four minutes
-    SecondSplit,
-}
-
-/// A life, moment by moment.
-pub struct Profile {
-    life: Life,
-    steps: Vec<f64>,
-}
-
-impl Profile {
-    /// The profile of a seed.
-    pub fn new(life: Life, seed: u64) -> Self {
-        let mut r = ChaCha8Rng::seed_from_u64(seed ^ 0xabcd_0000);
-        let (low, high) = match life {
-            Life::Turning => (0.0, 300.0),
-            Life::RestThenHand => (30.0, 90.0),
-            _ => (1.0, 10.0),
-        };
-        let steps = (0..400)
-            .map(|_| {
-                let v: f64 = low + (high - low) * r.random::<f64>();
-                if r.random::<bool>() { v } else { -v }
-            })
-            .collect();
-        Self { life, steps }
-    }
-
-    fn at(&self, t: f64, hold: f64) -> f64 {
-        // a body can't step: 50 ms to either side
-        let i = (t / hold).floor();
-        let into = t - i * hold;
-        let now = self.steps[i as usize];
-        let next = self.steps[i as usize + 1];
-        let before = if i > 0.0 { self.steps[i as usize - 1] } else { 0.0 };
-        let w = if into < 0.05 {
-            before + (now - before) * (0.5 + into / 0.1)
-        } else if into > hold - 0.05 {
-            now + (next - now) * (into - hold + 0.05) / 0.1
-        } else {
-            now
-        };
-        w.to_radians()
-    }
-
-    /// What happens at `t` s.
-    pub fn moment(&self, t: f64) -> Moment {
-        let earth = (10.0_f64 / 3600.0).to_radians();
-        let mut m = Moment { rate_rad_s: earth, ..Moment::default() };
-        match self.life {
-            Life::Rest => {}
-            Life::RestThenHand if (300.0..310.0).contains(&t) => m.rate_rad_s = self.at(t - 300.0, 5.0),
-            Life::Turning => m.rate_rad_s = self.at(t, 3.0),
-            Life::RestThenSlow if t >= 120.0 => m.rate_rad_s = self.at(t - 120.0, 5.0),
-            Life::Slow => m.rate_rad_s = self.at(t, 5.0),
-            Life::SecondSplit => m.tuned = t >= 240.0,
-            _ => {}
-        }
-        m
-    }
-}
-
-/// `trial` of every number below `count`, on all processors.
-pub fn all<R: Send>(count: u64, trial: impl Fn(u64) -> R + Sync) -> Vec<R> {
-    let next = std::sync::atomic::AtomicU64::new(0);
-    let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let mut done: Vec<(u64, R)> = std::thread::scope(|scope| {
-        let work = || {
-            let mut mine = Vec::new();
-            loop {
-                let number = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                if number >= count {
-                    return mine;
-                }
-                mine.push((number, trial(number)));
-            }
-        };
-        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        handles.into_iter().flat_map(|h| h.join().expect("a trial that ends")).collect()
-    });
-    done.sort_by_key(|(number, _)| *number);
-    done.into_iter().map(|(_, result)| result).collect()
 }

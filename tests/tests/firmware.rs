@@ -45,3 +45,14 @@ fn a_pair_of_samples_takes_at_most_eighty_instructions() {
         assert!(count <= 80.0, "{recording}: {count}");
     }
 }
+
+#[test]
+fn what_the_book_says_of_the_calibrators_instructions_is_the_baseline() {
+    let (page, baseline) = (read("docs/src/self-calibration.md"), baseline());
+    let count = |key: &str| &baseline[&format!("calibrator {key}")];
+    let rows = [("a slice of the learning", "slice"), ("a control step in all", "control")];
+    for (what, key) in rows {
+        let row = format!("| {what} | {} | {} |", count(key), count(&format!("{key}-most")));
+        assert!(page.contains(&row), "docs/src/self-calibration.md lacks the row\n{row}");
+    }
+}

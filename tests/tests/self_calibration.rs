@@ -1,35 +1,21 @@
 //! A gyroscope that calibrates itself: properties of the calibrator, and random devices that live ten minutes each.
 //!
-//! The full tables of the book are `CVG_LIFE=all CVG_TRIALS=1000 cargo test --release -p cvg-tests --test self_calibration
-//! table_of_lives -- --nocapture`; `CVG_FIRST` takes other devices, `CVG_DOUBLE` double precision.
+//! The full tables of the book are in `self_calibration/table.rs`, behind environment variables.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use cvg_calibrator::parameters::N;
 use cvg_calibrator::record::Refused;
 use cvg_calibrator::ud::{Growth, Ud, Update};
 use cvg_calibrator::{Calibrator, Commands, Health, Mode, Parameter, Settings, State};
 use cvg_model::{AxisForces, Envelope, Float, Pendulum};
-use cvg_tests::envelope_loop::{CONTROL_S, Device, Life, Loop, Moment, Profile, all, bias_deg};
+use cvg_tests::envelope_loop::lives::{Life, Profile, lived, steps};
+use cvg_tests::envelope_loop::{Device, Loop, Moment};
 use proptest::prelude::*;
 
-fn steps(seconds: f64) -> usize {
-    (seconds / CONTROL_S) as usize
-}
-
-/// A device lives for some seconds.
-fn lived<'a, T: Float>(device: &'a Device, seed: u64, life: Life, seconds: f64) -> Loop<'a, T> {
-    let profile = Profile::new(life, seed);
-    let mut run = Loop::<T>::new(device, seed, &Settings::default());
-    for i in 0..steps(seconds) {
-        run.step(profile.moment(run.t), true);
-        if life == Life::SecondSplit && i == steps(240.0) {
-            run.calibrator.split_changed(&mut run.state);
-        }
-    }
-    run
-}
+#[path = "self_calibration/table.rs"]
+mod table;
 
 /// Takes one measurement as the cycle does.
 fn measure<T: Float>(ud: &mut Ud<T>, h: &[T; N], noise: T) -> [T; N] {
@@ -144,7 +130,7 @@ proptest! {
         };
         let (sin, cos) = theta.sin_cos();
         let e = Envelope::new(cos, -q * sin, sin, q * cos);
-        let read = device.read(&e, 0.0);
+        let read = device.read(&e);
         let read = Envelope::new(read.x_c, read.x_s, read.y_c + skew * e.x_c, read.y_s + skew * e.x_s);
         let undone = calibrator.readout(&state, &read);
         for (a, b) in [(undone.x_c, e.x_c), (undone.x_s, e.x_s), (undone.y_c, e.y_c), (undone.y_s, e.y_s)] {
@@ -322,103 +308,13 @@ fn the_state_fits_into_two_kibibytes_in_single_precision() {
     assert!(size_of::<State<f32>>() <= 2048, "{}", size_of::<State<f32>>());
 }
 
-/// The first minutes of the table of lives, for every change.
+//= specs/self-calibration.md#followed
+//= type=test
+//# A gain that moves by 100 ppm a minute MUST be followed while the instrument turns, and at rest the status MUST say that it is not.
 #[test]
-fn two_minutes_of_turning_take_most_of_the_bias_away() {
-    for seed in [1000, 1001] {
-        let outcome = live::<f32>(Life::Turning, seed, 120.0);
-        assert!(outcome.reduction[0] > 20.0, "{seed}: {:?}", outcome.reduction);
-    }
-}
-
-struct Outcome {
-    reduction: [f64; 2],
-    left_deg: f64,
-    z: [f64; 3],
-    taken_back: u16,
-}
-
-fn live<T: Float>(life: Life, seed: u64, seconds: f64) -> Outcome {
-    let mut device = Device::random(seed);
-    if life == Life::SecondSplit {
-        device.tuned = (TAU * 0.3, (seed as f64 * 0.618).fract() * PI);
-    }
-    let run = lived::<T>(&device, seed, life, seconds);
-    let none = run.calibrator.start();
-    let measured = if life == Life::SecondSplit { device.with_split_tuned() } else { device.clone() };
-    let left_deg = bias_deg(&measured, &run.state, true, 500.0, 6.0);
-    let reduction = [
-        bias_deg(&measured, &none, false, 500.0, 6.0) / left_deg,
-        bias_deg(&measured, &none, false, 60.0, 24.0) / bias_deg(&measured, &run.state, true, 60.0, 24.0),
-    ];
-    let z = |p: Parameter, truth: f64| {
-        let e = run.state.estimate(p).unwrap();
-        (e.value.to_f64() - truth) / e.sigma.to_f64()
-    };
-    Outcome {
-        reduction,
-        left_deg,
-        z: [
-            z(Parameter::DetectionRatio, device.ratio - 1.0),
-            z(Parameter::DetectionSkew, device.ratio * device.skew),
-            z(Parameter::DetectionPhase, device.phase.1 - device.phase.0),
-        ],
-        taken_back: run.calibrator.status(&run.state).taken_back,
-    }
-}
-
-fn quantile(sorted: &[f64], p: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * p) as usize]
-}
-
-/// The tables of the book: `CVG_LIFE` names the lives, separated by commas, or `all`.
-#[test]
-fn table_of_lives() {
-    let Ok(only) = std::env::var("CVG_LIFE") else {
-        println!("skipped: CVG_LIFE is not set");
-        return;
-    };
-    let count = std::env::var("CVG_TRIALS").ok().and_then(|v| v.parse().ok()).unwrap_or(16);
-    let first: u64 = std::env::var("CVG_FIRST").ok().and_then(|v| v.parse().ok()).unwrap_or(0);
-    let double = std::env::var("CVG_DOUBLE").is_ok();
-    for life in [Life::Rest, Life::RestThenHand, Life::Turning, Life::RestThenSlow, Life::SecondSplit, Life::Slow] {
-        if only != "all" && !only.split(',').any(|o| o == format!("{life:?}")) {
-            continue;
-        }
-        let outcomes =
-            all(
-                count,
-                |n| if double { live::<f64>(life, first + n, 600.0) } else { live::<f32>(life, first + n, 600.0) },
-            );
-        for (i, name) in ["500", " 60"].iter().enumerate() {
-            let mut r: Vec<f64> = outcomes.iter().map(|o| o.reduction[i]).collect();
-            let grew: Vec<u64> =
-                (0..count).filter(|n| r[*n as usize] < 0.99 || r[*n as usize].is_nan()).map(|n| first + n).collect();
-            let worst: Vec<u64> = {
-                let mut order: Vec<u64> = (0..count).collect();
-                order.sort_by(|a, b| r[*a as usize].total_cmp(&r[*b as usize]));
-                order.iter().take(4).map(|n| first + n).collect()
-            };
-            r.sort_by(f64::total_cmp);
-            println!(
-                "{life:?} {name} deg/s, {count}: median {:.1}, 5 % below {:.2}, min {:.2}, grew {} {grew:?} worst {worst:?}",
-                quantile(&r, 0.5),
-                quantile(&r, 0.05),
-                r[0],
-                grew.len()
-            );
-        }
-        let held = |i: usize| outcomes.iter().filter(|o| o.z[i].abs() < 1.96).count() as f64 / count as f64;
-        let mut left: Vec<f64> = outcomes.iter().map(|o| o.left_deg * 1e3).collect();
-        left.sort_by(f64::total_cmp);
-        println!(
-            "  left {:.2} mdeg median, {:.2} at 95 %; intervals hold γ {:.3} s {:.3} ψ {:.3}; taken back {}",
-            quantile(&left, 0.5),
-            quantile(&left, 0.95),
-            held(0),
-            held(1),
-            held(2),
-            outcomes.iter().map(|o| u32::from(o.taken_back)).sum::<u32>()
-        );
-    }
+fn a_gain_that_moves_is_followed_while_the_instrument_turns() {
+    let turning = table::follow::<f32>(Life::Turning, 2000, 240.0);
+    assert!(turning.believed_rms < 50e-6 && turning.said, "{turning:?}");
+    let rest = table::follow::<f32>(Life::Rest, 2000, 120.0);
+    assert!(!rest.said, "{rest:?}");
 }

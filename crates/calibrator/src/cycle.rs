@@ -224,6 +224,9 @@ impl<T: Float> Calibrator<T> {
         for (mean, gain) in s.filter.mean.iter_mut().zip(s.filter.update.gain()) {
             *mean = *mean + *gain * by;
         }
+        if c == 0 && s.schedule.excited {
+            s.schedule.untold = 0;
+        }
         if c == 1 {
             s.schedule.angle_used = s.schedule.angle_used.saturating_add(1);
         }

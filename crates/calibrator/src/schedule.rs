@@ -14,6 +14,7 @@ impl<T: Float> Calibrator<T> {
     pub(crate) fn plan(&self, s: &mut State<T>) {
         let sc = &mut s.schedule;
         sc.profile = sc.profile.wrapping_add(1);
+        sc.untold = sc.untold.saturating_add(1);
         if !sc.live {
             // disturbed: nothing is asked of the drives
             s.precession = T::zero();
@@ -40,7 +41,7 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// The virtual precession: to and fro, so that the scale of the forces and a constant rate are two things.
-    fn profile(&self, moving: bool, idle: bool, stage: u8, cycle: u32) -> T {
+    pub(crate) fn profile(&self, moving: bool, idle: bool, stage: u8, cycle: u32) -> T {
         let second = u32::from(self.cycles(1)).max(1);
         let flip = |hold_s: u32| (cycle / (hold_s * second)) % 2 == 1;
         let signed = |v: T, minus: bool| if minus { -v } else { v };

@@ -63,6 +63,8 @@ pub(crate) struct Schedule<T> {
     pub(crate) fresh: u16,
     /// twice the innovations beyond all expectation, less those within
     pub(crate) refused: u16,
+    /// cycles since rotation told the detection
+    pub(crate) untold: u16,
     pub(crate) excited: bool,
     pub(crate) live: bool,
     pub(crate) accept: bool,
@@ -160,6 +162,7 @@ impl<T: Float> Schedule<T> {
             profile: 0,
             fresh: 0,
             refused: 0,
+            untold: u16::MAX,
             excited: false,
             live: false,
             accept: false,

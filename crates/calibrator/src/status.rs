@@ -27,6 +27,8 @@ pub struct Status<T> {
     pub learned: bool,
     /// the ratio and the skew of the detection have been told, by rotation or by the split
     pub detection_known: bool,
+    /// rotation tells the detection as it is now: what drifts is followed; at rest it can't be
+    pub detection_followed: bool,
     /// standard deviation of the angle-dependent bias that ratio and skew may still make, rad
     pub bias_rad: T,
     /// commits that were taken back
@@ -42,12 +44,16 @@ pub struct Estimate<T> {
     pub sigma: T,
 }
 
+/// Seconds for which what rotation told counts as told now.
+const FOLLOWED_S: u16 = 20;
 /// Below this the ratio and the skew count as known, rad of bias.
 const KNOWN_RAD: f64 = 2e-3;
 
 impl<T: Float> Calibrator<T> {
     //= specs/self-calibration.md#not-guessed
     //# A detection that nothing has told MUST be said to be unknown.
+    //= specs/self-calibration.md#followed
+    //# A gain that moves by 100 ppm a minute MUST be followed while the instrument turns, and at rest the status MUST say that it is not.
     /// What is known, and what goes on.
     pub fn status(&self, state: &State<T>) -> Status<T> {
         let sc = &state.schedule;
@@ -60,10 +66,12 @@ impl<T: Float> Calibrator<T> {
         };
         let variance = |p: Parameter| state.filter.ud.variance(p as usize) * p.expected::<T>().squared();
         let bias_rad = T::half() * (variance(Parameter::DetectionRatio) + variance(Parameter::DetectionSkew)).sqrt();
+        let detection_known = bias_rad < T::from_f64(KNOWN_RAD);
         Status {
             mode,
             learned: sc.stage >= 4,
-            detection_known: bias_rad < T::from_f64(KNOWN_RAD),
+            detection_known,
+            detection_followed: detection_known && sc.untold < self.cycles(FOLLOWED_S),
             bias_rad,
             taken_back: state.taken_back,
         }
