@@ -10,6 +10,9 @@
 // The most effects that are undone, of the readout and of the actuation each.
 #define CVG_MOST_COMPENSATED 4
 
+// Bytes of what cvg_calibrator_save writes.
+#define CVG_RECORD_BYTES 308
+
 // What the instrument is doing: cvg_output.mode.
 enum cvg_mode
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -57,6 +60,26 @@ enum cvg_fault
 typedef enum cvg_fault cvg_fault;
 #else
 typedef uint8_t cvg_fault;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What became of a record: the answer of cvg_calibrator_restore.
+enum cvg_record
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  CVG_RECORD_RESTORED,
+  CVG_RECORD_DAMAGED,
+  CVG_RECORD_OF_ANOTHER_VERSION,
+  CVG_RECORD_IMPLAUSIBLE,
+  CVG_RECORD_NULL,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum cvg_record cvg_record;
+#else
+typedef uint8_t cvg_record;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -209,6 +232,104 @@ typedef struct {
   float correction_rad_s;
 } cvg_seen;
 
+// What a calibrator is told of its instrument. Begin with cvg_calibrator_settings_default.
+typedef struct {
+  // control period, s
+  double control_s;
+  // set amplitude, V
+  double amplitude_v;
+  // rate of the envelope that a volt of command makes, V/s
+  double drive_per_s;
+  // 1/tau as designed, 1/s
+  double damping_per_s;
+  // control steps to a cycle of the filter: at least 80, and 10 to 100 ms
+  uint16_t steps;
+  // fastest precession that may be commanded at rest, rad/s
+  double precession_rad_s;
+  // precession that may be commanded, to and fro, while the instrument turns, rad/s
+  double dither_rad_s;
+} cvg_calibrator_settings;
+
+// A calibrator: immutable after cvg_calibrator_init. Its content has no meaning outside.
+typedef struct {
+  uint64_t content[8];
+} cvg_calibrator;
+
+// What a calibrator has learned. Its content has no meaning outside and must not be written.
+typedef struct {
+  uint64_t content[256];
+} cvg_learned;
+
+// Both channels, in phase and in quadrature: an envelope, V, or forces, V.
+typedef struct {
+  // X in phase
+  float x_c;
+  // X in quadrature
+  float x_s;
+  // Y in phase
+  float y_c;
+  // Y in quadrature
+  float y_s;
+} cvg_four;
+
+// What to add to the commands of the loops.
+typedef struct {
+  // to v_qs, V: the virtual precession
+  float v_qs;
+  // to v_qc, V: holds the split
+  float v_qc;
+  // to the oscillator's frequency, rad/s
+  float detuning_rad_s;
+} cvg_added;
+
+// What a control step measured behind cvg_calibrator_readout, and what it commands before cvg_calibrator_drives.
+typedef struct {
+  // E, V²
+  float energy;
+  // Q, V²
+  float quadrature;
+  // R, V²
+  float r;
+  // S, V²
+  float s;
+  // L, V²
+  float l;
+  // cosine of the pattern's angle, its sign continuous
+  float cos;
+  // sine likewise
+  float sin;
+  // energy loop's command, V
+  float v_as;
+  // rate loop's command, V
+  float v_qs;
+  // quadrature loop's command, V
+  float v_qc;
+  // start-up, a fault, a command or a reading at its limit: nothing is learned from this step
+  bool disturbed;
+} cvg_control;
+
+// What is known.
+typedef struct {
+  // the coarse stages are over
+  bool learned;
+  // ratio and skew of the detection have been told
+  bool detection_known;
+  // rotation tells the detection as it is now
+  bool detection_followed;
+  // standard deviation of the bias that ratio and skew may still make, rad
+  float bias_rad;
+  // commits that were taken back
+  uint16_t taken_back;
+  // ratio of the detection less one, and its standard deviation
+  float ratio;
+  // standard deviation of it
+  float ratio_sigma;
+  // skew of the detection
+  float skew;
+  // standard deviation of it
+  float skew_sigma;
+} cvg_known;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -259,6 +380,168 @@ double cvg_angle_deg(const cvg_state *state);
 // # Safety
 // That of cvg_step.
 cvg_seen cvg_last_control(const cvg_state *state);
+
+// Settings for loops at 2 kHz and an amplitude of 1 V.
+cvg_calibrator_settings cvg_calibrator_settings_default(void);
+
+// Fills `calibrator` and `learned` by `settings`, nothing learned; says what was refused, and leaves both as they were then.
+//
+// # Safety
+// The pointers are null or point to such structures.
+cvg_refusal cvg_calibrator_init(cvg_calibrator *calibrator,
+                                cvg_learned *learned,
+                                const cvg_calibrator_settings *settings);
+
+// The readout undone, as far as it is known; the readout itself without a calibrator.
+//
+// # Safety
+// The pointers are null, or were filled by cvg_calibrator_init and not written since but by the functions here.
+cvg_four cvg_calibrator_readout(const cvg_calibrator *calibrator,
+                                const cvg_learned *learned,
+                                cvg_four envelope);
+
+// What to add to the commands of the loops, for a pattern along (cos, sin) of this amplitude, V; zeros without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_added cvg_calibrator_forward(const cvg_calibrator *calibrator,
+                                 const cvg_learned *learned,
+                                 float cos,
+                                 float sin,
+                                 float amplitude_v);
+
+// The drives undone: what to command for these forces, V; the forces themselves without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_four cvg_calibrator_drives(const cvg_calibrator *calibrator,
+                               const cvg_learned *learned,
+                               cvg_four forces);
+
+// One control step of the learning.
+//
+// # Safety
+// That of cvg_calibrator_readout; `control` is null or points to such a structure.
+void cvg_calibrator_step(const cvg_calibrator *calibrator,
+                         cvg_learned *learned,
+                         const cvg_control *control);
+
+// The rate of the pattern that is not rotation, rad/s, as far as it is known; 0 without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_step.
+float cvg_calibrator_not_rotation(const cvg_calibrator *calibrator,
+                                  const cvg_learned *learned,
+                                  const cvg_control *control);
+
+// A tuning electrode has changed the split.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+void cvg_calibrator_split_changed(const cvg_calibrator *calibrator, cvg_learned *learned);
+
+// What is known; nothing without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_known cvg_calibrator_known(const cvg_calibrator *calibrator, const cvg_learned *learned);
+
+// Writes what was learned to `record`, CVG_RECORD_BYTES of it; false without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout; `record` is null or points to CVG_RECORD_BYTES.
+bool cvg_calibrator_save(const cvg_calibrator *calibrator,
+                         const cvg_learned *learned,
+                         uint8_t *record);
+
+// Starts `learned` anew from a record; one that is refused leaves it as it was.
+//
+// # Safety
+// That of cvg_calibrator_save.
+cvg_record cvg_calibrator_restore(const cvg_calibrator *calibrator,
+                                  cvg_learned *learned,
+                                  const uint8_t *record);
+
+// Settings for loops at 2 kHz and an amplitude of 1 V.
+cvg_calibrator_settings cvg_calibrator_settings_default(void);
+
+// Fills `calibrator` and `learned` by `settings`, nothing learned; says what was refused, and leaves both as they were then.
+//
+// # Safety
+// The pointers are null or point to such structures.
+cvg_refusal cvg_calibrator_init(cvg_calibrator *calibrator,
+                                cvg_learned *learned,
+                                const cvg_calibrator_settings *settings);
+
+// The readout undone, as far as it is known; the readout itself without a calibrator.
+//
+// # Safety
+// The pointers are null, or were filled by cvg_calibrator_init and not written since but by the functions here.
+cvg_four cvg_calibrator_readout(const cvg_calibrator *calibrator,
+                                const cvg_learned *learned,
+                                cvg_four envelope);
+
+// What to add to the commands of the loops, for a pattern along (cos, sin) of this amplitude, V; zeros without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_added cvg_calibrator_forward(const cvg_calibrator *calibrator,
+                                 const cvg_learned *learned,
+                                 float cos,
+                                 float sin,
+                                 float amplitude_v);
+
+// The drives undone: what to command for these forces, V; the forces themselves without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_four cvg_calibrator_drives(const cvg_calibrator *calibrator,
+                               const cvg_learned *learned,
+                               cvg_four forces);
+
+// One control step of the learning.
+//
+// # Safety
+// That of cvg_calibrator_readout; `control` is null or points to such a structure.
+void cvg_calibrator_step(const cvg_calibrator *calibrator,
+                         cvg_learned *learned,
+                         const cvg_control *control);
+
+// The rate of the pattern that is not rotation, rad/s, as far as it is known; 0 without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_step.
+float cvg_calibrator_not_rotation(const cvg_calibrator *calibrator,
+                                  const cvg_learned *learned,
+                                  const cvg_control *control);
+
+// A tuning electrode has changed the split.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+void cvg_calibrator_split_changed(const cvg_calibrator *calibrator, cvg_learned *learned);
+
+// What is known; nothing without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout.
+cvg_known cvg_calibrator_known(const cvg_calibrator *calibrator, const cvg_learned *learned);
+
+// Writes what was learned to `record`, CVG_RECORD_BYTES of it; false without a calibrator.
+//
+// # Safety
+// That of cvg_calibrator_readout; `record` is null or points to CVG_RECORD_BYTES.
+bool cvg_calibrator_save(const cvg_calibrator *calibrator,
+                         const cvg_learned *learned,
+                         uint8_t *record);
+
+// Starts `learned` anew from a record; one that is refused leaves it as it was.
+//
+// # Safety
+// That of cvg_calibrator_save.
+cvg_record cvg_calibrator_restore(const cvg_calibrator *calibrator,
+                                  cvg_learned *learned,
+                                  const uint8_t *record);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,4 +1,4 @@
-//! The instrument for C, in single precision: `include/cvg.h` and a static library.
+//! The instrument and the [calibrator] for C, in single precision: `include/cvg.h` and a static library.
 //!
 //! The caller owns the memory: an instrument and a state are structures of fixed size without meaning outside, filled by
 //! [`cvg_init`]. Nothing is allocated, nothing is kept between calls. A step takes what the converters read and gives what
@@ -7,6 +7,8 @@
 //! This is the only crate for firmware with unsafe code: what it trusts the caller for stands at each function. A null
 //! pointer is no undefined behaviour: it is refused, or answered with nothing.
 #![cfg_attr(not(feature = "std"), no_std)]
+
+pub mod calibrator;
 
 use core::ffi::{CStr, c_char};
 use core::mem::{align_of, size_of};
@@ -261,13 +263,24 @@ pub extern "C" fn cvg_settings_default() -> Settings {
     }
 }
 
-fn refusal(e: cvg_instrument::ConfigError) -> Refusal {
-    Refusal {
-        parameter: e.parameter.as_ptr().cast(),
-        parameter_length: e.parameter.len(),
-        expected: e.expected.as_ptr().cast(),
-        expected_length: e.expected.len(),
+impl Refusal {
+    pub(crate) fn nothing() -> Self {
+        let none = core::ptr::null();
+        Self { parameter: none, parameter_length: 0, expected: none, expected_length: 0 }
     }
+}
+
+pub(crate) fn refused(parameter: &'static str, expected: &'static str) -> Refusal {
+    Refusal {
+        parameter: parameter.as_ptr().cast(),
+        parameter_length: parameter.len(),
+        expected: expected.as_ptr().cast(),
+        expected_length: expected.len(),
+    }
+}
+
+fn refusal(e: cvg_instrument::ConfigError) -> Refusal {
+    refused(e.parameter, e.expected)
 }
 
 type Effects = [(EffectId, Values<f64>); MOST_COMPENSATED];
@@ -322,12 +335,7 @@ pub unsafe extern "C" fn cvg_init(
                 state.cast::<SingleState>().write(made.start());
                 instrument.cast::<Single>().write(made);
             }
-            Refusal {
-                parameter: core::ptr::null(),
-                parameter_length: 0,
-                expected: core::ptr::null(),
-                expected_length: 0,
-            }
+            Refusal::nothing()
         }
     }
 }

@@ -16,6 +16,7 @@ fn the_header_is_current() {
     let bindings = cbindgen::Builder::new()
         .with_config(configuration)
         .with_src(folder.join("src/lib.rs"))
+        .with_src(folder.join("src/calibrator.rs"))
         .generate()
         .expect("bindings");
     let mut made = Vec::new();

@@ -61,6 +61,65 @@ static cvg_output sample(const cvg_settings *s, const cvg_instrument *i, cvg_sta
     return out;
 }
 
+// The loops at the envelope around a readout of 3 % ratio and a drive of 2 %, with the calibrator joined to them: turned by
+// hand after a minute at rest. No line of it knows the ratio; what is learned, and what is kept over a night, has to be it.
+static void self_calibration(void) {
+    cvg_calibrator calibrator;
+    cvg_learned learned;
+    cvg_calibrator_settings s = cvg_calibrator_settings_default(), wrong = s;
+    wrong.steps = 40;
+    expect(cvg_calibrator_init(&calibrator, &learned, &wrong).parameter_length > 0, "a cycle of 40 steps is refused");
+    expect(cvg_calibrator_init(&calibrator, &learned, NULL).parameter_length > 0, "no settings are refused");
+    expect(cvg_calibrator_init(&calibrator, &learned, &s).parameter_length == 0, "the settings are taken");
+    const double dt = s.control_s, split = 1.5;
+    double x = 1, y = 0, xq = 0, yq = 0, energy = -0.05 / 16, quadrature = 0, phase = 0, c = 1, n = 0;
+    for (long k = 0; k < 240000; k++) {
+        const double rate = k > 140000 && k < 160000 ? 1.0 : 0.0;
+        const cvg_four read = {(float)x, (float)xq, (float)(1.03 * y), (float)(1.03 * yq)};
+        const cvg_four e = cvg_calibrator_readout(&calibrator, &learned, read);
+        const double E = e.x_c * e.x_c + e.x_s * e.x_s + e.y_c * e.y_c + e.y_s * e.y_s;
+        const double Q = 2 * (e.x_c * e.y_s - e.y_c * e.x_s), R = e.x_c * e.x_c + e.x_s * e.x_s - e.y_c * e.y_c - e.y_s * e.y_s;
+        const double S = 2 * (e.x_c * e.y_c + e.x_s * e.y_s);
+        const double theta = 0.5 * atan2(S, R), sign = cos(theta) * c + sin(theta) * n < 0 ? -1 : 1;
+        c = sign * cos(theta), n = sign * sin(theta);
+        const double u = e.x_c * c + e.y_c * n, uq = e.x_s * c + e.y_s * n, L = 2 * u * uq;
+        const cvg_added add = cvg_calibrator_forward(&calibrator, &learned, (float)c, (float)n, 1.0f);
+        energy += (E - 1) * dt, quadrature += Q * dt, phase += L * 200 * dt;
+        const cvg_control control = {.energy = (float)E, .quadrature = (float)Q, .r = (float)R, .s = (float)S, .l = (float)L,
+            .cos = (float)c, .sin = (float)n, .v_as = (float)(8 * (E - 1 + 2 * energy)), .v_qs = add.v_qs,
+            .v_qc = (float)(-8 * (Q + 2 * quadrature)) + add.v_qc, .disturbed = false};
+        const double ahead = 40 * L + phase - add.detuning_rad_s;
+        const cvg_four wanted = {(float)(-control.v_qc * n), (float)(control.v_as * c - control.v_qs * n),
+            (float)(control.v_qc * c), (float)(control.v_as * n + control.v_qs * c)};
+        const cvg_four f = cvg_calibrator_drives(&calibrator, &learned, wanted);
+        cvg_calibrator_step(&calibrator, &learned, &control);
+        // X' = k Omega Y - X/tau - F_s - i(F_c + split X/2 - ahead X), X = x - i xq; two steps of the midpoint rule
+        const double at[4] = {x, xq, y, yq};
+        for (int half = 2; half >= 1; half--) {
+            const double h = dt / half, a = 0.5 * split;
+            const double dx = 0.8 * rate * y - 0.05 * x - f.x_s + (a - ahead) * -xq, dxq = 0.8 * rate * yq - 0.05 * xq + f.x_c + (a - ahead) * x;
+            const double dy = -0.8 * rate * x - 0.05 * y - 1.02 * f.y_s + (-a - ahead) * -yq;
+            const double dyq = -0.8 * rate * xq - 0.05 * yq + 1.02 * f.y_c + (-a - ahead) * y;
+            x = at[0] + h * dx, xq = at[1] + h * dxq, y = at[2] + h * dy, yq = at[3] + h * dyq;
+        }
+    }
+    const cvg_known known = cvg_calibrator_known(&calibrator, &learned);
+    printf("learned a ratio of %.5f, %.0e\n", known.ratio, known.ratio_sigma);
+    expect(known.learned && known.detection_known && fabs(known.ratio - 0.03) < 1e-3, "the ratio is learned");
+    unsigned char record[CVG_RECORD_BYTES];
+    expect(cvg_calibrator_save(&calibrator, &learned, record), "it is saved");
+    cvg_learned other;
+    cvg_calibrator_init(&calibrator, &other, &s);
+    record[100] ^= 1;
+    expect(cvg_calibrator_restore(&calibrator, &other, record) == CVG_RECORD_DAMAGED, "a damaged record is refused");
+    record[100] ^= 1;
+    expect(cvg_calibrator_restore(&calibrator, &other, record) == CVG_RECORD_RESTORED, "a whole one is restored");
+    const cvg_four x_alone = {1, 0, 0, 0}, y_alone = {0, 0, 1.03f, 0};
+    const double along_x = cvg_calibrator_readout(&calibrator, &other, x_alone).x_c;
+    expect(fabs(cvg_calibrator_readout(&calibrator, &other, y_alone).y_c / along_x - 1) < 2e-3, "and compensates");
+    expect(cvg_calibrator_readout(NULL, &other, y_alone).y_c == 1.03f, "null is answered");
+}
+
 int main(void) {
     cvg_instrument instrument;
     cvg_state state;
@@ -108,5 +167,6 @@ int main(void) {
     for (long k = 0; k < 200000; k++) out = sample(&s, &instrument, &state, &r, false);
     printf("held at %.3f deg\n", cvg_angle_deg(&state));
     expect(out.mode == CVG_HOLD && fabs(remainder(cvg_angle_deg(&state), 180.0)) < 1.0, "held");
+    self_calibration();
     return failures != 0;
 }
