@@ -127,6 +127,9 @@ pub(crate) enum Command {
         /// Print report.json and nothing else to standard output
         #[arg(long)]
         json: bool,
+        /// The device calibrates itself instead, without a table; the error over time
+        #[arg(long, conflicts_with = "json")]
+        self_calibration: bool,
     },
     /// Simulate a scenario: a campaign of recordings, and what it was set to
     Simulate {

@@ -20,6 +20,7 @@ mod output;
 mod paper;
 mod progress;
 mod report;
+mod self_calibration;
 mod standard;
 
 use std::io::IsTerminal;
@@ -70,7 +71,8 @@ fn keep_to_the_machine() {
 
 fn run(command: Command) -> Result<(), Failure> {
     match command {
-        Command::Demo { out, json } => demo::demo(&out, json),
+        Command::Demo { out, self_calibration: true, .. } => self_calibration::demo(&out),
+        Command::Demo { out, json, .. } => demo::demo(&out, json),
         Command::Simulate { scenario, out } => commands::simulate(&scenario, &out),
         Command::Inspect { files, mapping, plot, json } => {
             inspect::inspect(&files, &mapping.naming()?, plot.as_deref(), json)

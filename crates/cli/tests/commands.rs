@@ -57,6 +57,21 @@ fn demo_writes_report_and_calibration() {
 }
 
 #[test]
+fn the_demo_of_self_calibration_ends_with_a_small_error_and_says_what_rest_cannot_tell() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("demo");
+    let said = cvg_ok(&[OsStr::new("demo"), OsStr::new("--self-calibration"), OsStr::new("--out"), out.as_os_str()]);
+    assert!(said.contains("not known") && said.contains("times smaller"), "{said}");
+    let table = fs::read_to_string(out.join("self-calibration.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let bias = |row: &[&str]| row[2].parse::<f64>().unwrap();
+    let (first, last) = (rows.first().unwrap(), rows.last().unwrap());
+    assert!(bias(last) < bias(first) / 100.0, "{first:?} {last:?}");
+    assert!((last[3].parse::<f64>().unwrap() - DETECTION_RATIO).abs() < 1e-4, "{last:?}");
+    assert!(fs::read_to_string(out.join("self-calibration.svg")).unwrap().contains("<svg"));
+}
+
+#[test]
 fn demo_with_json_prints_the_report_and_nothing_else() {
     let folder = TempDir::new().unwrap();
     let said = cvg_ok(&[OsStr::new("demo"), OsStr::new("--json"), OsStr::new("--out"), folder.path().as_os_str()]);

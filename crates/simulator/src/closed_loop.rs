@@ -14,6 +14,7 @@ use cvg_model::resonator::Resonator;
 use cvg_model::{AxisForces, Envelope, Orbit};
 
 use crate::flicker::Wander;
+use crate::learning::Learner;
 use crate::noise::Noise;
 use crate::plant::{Plant, reference_ahead};
 use crate::stages::Stages;
@@ -111,6 +112,7 @@ pub struct ClosedLoop {
     noise: Option<Noise>,
     force_noise: Option<Noise>,
     wander: Wander,
+    learner: Option<Learner>,
     // state
     sample: u64,
     /// samples since t = 0
@@ -190,6 +192,7 @@ impl ClosedLoop {
             noise: (design.noise_v > 0.0).then_some(noise),
             force_noise: (design.force_noise_v > 0.0).then_some(force_noise),
             wander,
+            learner: None,
             sample: 0,
             tick: 0_i64.saturating_sub_unsigned(course.warm_up_samples),
             table_rad: 0.0,
@@ -201,6 +204,31 @@ impl ClosedLoop {
             seen: rest,
             design: design.clone(),
         }
+    }
+
+    /// The same loop with a calibrator in it.
+    #[must_use]
+    pub fn with(self, learner: Learner) -> Self {
+        Self { learner: Some(learner), ..self }
+    }
+
+    /// The calibrator in it, if there is one.
+    pub fn learner(&self) -> Option<&Learner> {
+        self.learner.as_ref()
+    }
+
+    /// The calibrator learns on, or holds what it has.
+    pub fn set_learning(&mut self, learning: bool) {
+        if let Some(learner) = &mut self.learner {
+            learner.learning = learning;
+        }
+    }
+
+    /// The table turns at another rate from the next sample on, rad/s.
+    pub fn turn_at(&mut self, rate_rad_s: f64) {
+        let d = &self.design;
+        let plant = Plant::new(&d.resonator, &d.stages, rate_rad_s, d.ahead_rad_s, d.drive_per_s_v, d.period_s);
+        self.leg = Leg { from: self.sample, rate_rad_s, plant };
     }
 
     /// What the electronics knew at the sample of the last [`step`](Self::step).
@@ -246,6 +274,7 @@ impl ClosedLoop {
             let [r, c] = self.imperfect_readout(at);
             (Envelope::new(r.x_c, r.x_s, r.y_c, r.y_s), Envelope::new(c.x_c, c.x_s, c.y_c, c.y_s))
         };
+        let compensated = self.learner.as_ref().map_or(compensated, |l| l.readout(&compensated));
         let pendulum = compensated.pendulum();
         let major = direction::major_axis(&compensated, &pendulum);
         let v_as = if self.sample < self.energy_off_at {
@@ -259,8 +288,19 @@ impl ClosedLoop {
             None => 0.0,
         };
         let correction_rad_s = self.design.phase.step(&mut self.lock_state, &pendulum).rad_s;
+        let mut commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: 0.0 };
+        let mut correction_rad_s = correction_rad_s;
+        if let Some(learner) = &mut self.learner {
+            let forward = learner.forward(&pendulum, &major);
+            commands.v_qs += forward.precession_v;
+            commands.v_qc += forward.quadrature_v;
+            correction_rad_s += forward.detuning_rad_s;
+            learner.step(&pendulum, &commands);
+        }
+        let OrbitCommands { v_qs, v_qc, .. } = commands;
         self.seen = Seen { t_s: at.t_s, readout, compensated, v_as, v_qc, v_qs, correction_rad_s };
-        self.design.allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac: 0.0 }, major.cos, major.sin).volts
+        let volts = self.design.allocation.step(&commands, major.cos, major.sin).volts;
+        self.learner.as_ref().map_or(volts, |l| l.drives(&volts))
     }
 
     /// The readout with its effects and its noise, and what the electronics' compensation makes of it.

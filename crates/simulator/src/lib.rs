@@ -3,7 +3,7 @@
 //! A [`Scenario`] says what a device is, what is wrong with it and which runs are recorded; [`Scenario::simulate`]
 //! makes the recordings in memory, [`Simulated::write`] puts them into a folder as a campaign with its truth beside
 //! it. Below that lie the resonator's envelope, propagated exactly between control samples ([`plant`]), the control
-//! loop around it ([`closed_loop`]), and a two-channel angle sensor without any loop ([`sensor`]).
+//! loop around it ([`closed_loop`], with a calibrator in it where one is [joined](learning)), and a two-channel angle sensor without any loop ([`sensor`]).
 //!
 //! Effects come from the library in `cvg_model::effects` and act in the stage where they say they do: nothing here
 //! names one.
@@ -35,6 +35,7 @@ pub mod campaign;
 pub mod carrier;
 pub mod closed_loop;
 pub mod flicker;
+pub mod learning;
 pub mod noise;
 pub mod plant;
 pub mod scenario;
@@ -43,4 +44,5 @@ pub mod stages;
 
 pub use campaign::{Column, Simulated, SimulatedRun, WriteError};
 pub use closed_loop::{ClosedLoop, Seen};
+pub use learning::Learner;
 pub use scenario::{Scenario, ScenarioError, Settings};
