@@ -8,7 +8,7 @@ use crate::complex::{Complex, Matrix};
 use crate::parameters::{DETECTION, OTHERS, Parameter, Vector, get, set};
 
 /// How far a value in force may be from a perfect instrument, in units of what is expected of devices.
-const FARTHEST: f64 = 12.0;
+pub(crate) const FARTHEST: f64 = 12.0;
 
 /// What is undone, and what the mechanics are known to do. Readout: x, y in amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,6 +7,8 @@ pub mod complex;
 pub mod correction;
 mod cycle;
 pub mod parameters;
+#[cfg(any(kani, test, cvg_prove))]
+pub mod proofs;
 pub mod record;
 mod regressors;
 mod schedule;

@@ -13,17 +13,17 @@ pub const ABOVE: usize = N * (N - 1) / 2;
 /// The factors of a covariance of [`N`] parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ud<T> {
-    above: [T; ABOVE],
-    d: [T; N],
+    pub(crate) above: [T; ABOVE],
+    pub(crate) d: [T; N],
 }
 
 /// A measurement that is being taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update<T> {
     /// Uᵀh
-    f: [T; N],
+    pub(crate) f: [T; N],
     /// the gain so far
-    gain: [T; N],
+    pub(crate) gain: [T; N],
     /// variance of the innovation so far
     alpha: T,
     inverse: T,
@@ -223,9 +223,9 @@ impl<T: Float> Ud<T> {
 /// A growth of the covariance under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth<T> {
-    a: [T; N],
-    q: T,
-    next: usize,
+    pub(crate) a: [T; N],
+    pub(crate) q: T,
+    pub(crate) next: usize,
 }
 
 impl<T: Float> Growth<T> {

@@ -163,7 +163,7 @@ fn entries(text: &str) -> Result<Vec<Proof>, String> {
 fn is_younger(file: &Path, repository: &Path) -> bool {
     let modified = |path: &Path| fs::metadata(path).and_then(|m| m.modified()).ok();
     let Some(written) = modified(file) else { return false };
-    let folders = ["model", "estimator", "controller", "instrument", "kani-shim", "xtask/src/prove"];
+    let folders = ["model", "estimator", "controller", "calibrator", "instrument", "kani-shim", "xtask/src/prove"];
     let sources = folders.iter().flat_map(|f| source::rust_files(&repository.join("crates").join(f)));
     sources.filter_map(|path| modified(&path)).all(|source| source < written)
 }

@@ -10,7 +10,7 @@ use super::Harness;
 use super::root::Root;
 
 /// The crates that have harnesses; the guards are files of this one.
-pub(crate) const CRATES: [&str; 4] = ["estimator", "controller", "instrument", "model"];
+pub(crate) const CRATES: [&str; 5] = ["estimator", "controller", "instrument", "calibrator", "model"];
 
 /// The folders in which the C is, ready for CBMC, by the crate whose harnesses it holds.
 pub(crate) fn compile(
