@@ -204,6 +204,8 @@ impl<T: Float> PrecessionState<T> {
         (self.half_turns, within.bounded(T::half() * T::PI))
     }
 
+    //= specs/electronics.md#certified-angle
+    //# The angle of the instrument MUST be that of the envelope at the converters within the certified bound.
     /// The unwrapped angle in degrees, in double precision.
     pub fn degrees(&self) -> f64 {
         let (half_turns, within) = self.angle();

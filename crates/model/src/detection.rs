@@ -111,6 +111,8 @@ pub fn measured_angle<T: Real>(g: T, theta: T) -> T {
 //# Equal gains MUST give an error of exactly zero.
 //= specs/equation-07.md#small-mismatch
 //# The error MUST be half the mismatch times the sine of twice the angle up to the square of the mismatch.
+//= specs/equation-07.md#compensation
+//# A ratio that a compensation leaves between one and that of the readout MUST NOT enlarge the error at any angle, and one between its inverse and itself MUST NOT enlarge the bound.
 /// θ_error = θ_d − θ of Equation 7 in closed form, rad:
 ///
 /// $$\theta_{error} = \operatorname{atan2}\left((g-1)\sin 2\theta,\ (g+1)-(g-1)\cos 2\theta\right)$$

@@ -101,6 +101,8 @@ impl<T: Real> Envelope<T> {
     //# The energy MUST be zero or more, or NaN where a component of the envelope is NaN.
     //= specs/equation-02.md#energy-bounds-the-orientation
     //# The magnitude of R MUST NOT exceed E.
+    //= specs/electronics.md#envelope-error
+    //# The sine of half the angle between the points of two envelopes on the sphere of Equation 2 MUST NOT exceed the length of their difference over the length of either.
     /// **Equation 2**, the pendulum variables:
     ///
     /// $$E = x_c^2+x_s^2+y_c^2+y_s^2,\quad Q = 2(x_c y_s - y_c x_s),$$
