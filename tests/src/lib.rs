@@ -9,6 +9,8 @@
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "recordings")]
+pub mod angle_sensor;
+#[cfg(feature = "recordings")]
 pub mod bench;
 #[cfg(feature = "recordings")]
 pub mod blind;

@@ -4,53 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use cvg_calibration::recording::{Campaign, Instrument, Recording, Reference, Role, Run, RunKind};
-use cvg_calibration::report::{EffectReport, Status};
-use cvg_calibration::{Identification, Options, compensate, identify};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-
-/// Standard normal noise from a seed.
-struct Noise(ChaCha8Rng);
-
-impl Noise {
-    fn new(seed: u64) -> Self {
-        Self(ChaCha8Rng::seed_from_u64(seed))
-    }
-
-    fn next(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.0)
-    }
-}
-
-fn run(name: &str, role: Role, recording: Recording) -> Run {
-    let file = name.into();
-    Run { kind: RunKind::Rotation, file, settle_s: 0.0, role, amplitude: None, recording }
-}
-
-fn sensor(runs: Vec<Run>) -> Campaign {
-    Campaign {
-        device: "sensor".into(),
-        instrument: Instrument::Sensor,
-        angular_gain: Some(1.0),
-        period_deg: Some(360.0),
-        runs,
-        ..Campaign::default()
-    }
-}
-
-fn identified(campaign: Campaign) -> Identification {
-    identify(campaign, &Options::default()).unwrap()
-}
-
-fn held_out(i: &Identification) -> f64 {
-    i.report.heldout.discovered.rms_deg
-}
-
-fn find<'a>(i: &'a Identification, id: &str) -> Option<&'a EffectReport> {
-    i.report.effects.iter().find(|e| e.id == id)
-}
+use cvg_calibration::recording::{Campaign, Instrument, Recording, Reference, Role, Run};
+use cvg_calibration::report::Status;
+use cvg_calibration::{Options, compensate, identify};
+use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, run, sensor};
 
 /// One turn there and back at 60 deg/s with ramps, 100 samples/s: time, angle of the table in deg, rate in deg/s.
 fn there_and_back() -> Vec<(f64, f64, f64)> {
@@ -97,7 +54,7 @@ fn faulty_resolver(seed: u64, role: Role) -> Run {
     let recording = Recording {
         t_s: path.iter().map(|p| p.0).collect(),
         table_deg: Some(path.iter().map(|p| p.1).collect()),
-        theta_deg: Some(path.iter().map(|p| theta(p.1, p.2, noise.next()).rem_euclid(360.0)).collect()),
+        theta_deg: Some(path.iter().map(|p| theta(p.1, p.2, noise.sample()).rem_euclid(360.0)).collect()),
         ..Recording::default()
     };
     run("there-and-back.csv", role, recording)
@@ -128,7 +85,7 @@ fn encoder_at_stations(held: bool, seed: u64) -> Run {
     let recording = Recording {
         t_s: stations.iter().map(|i| f64::from(*i)).collect(),
         table_deg: Some(stations.iter().map(|i| f64::from(*i) * 1.8).collect()),
-        theta_deg: Some(stations.iter().map(|&i| theta(i, noise.next())).collect()),
+        theta_deg: Some(stations.iter().map(|&i| theta(i, noise.sample())).collect()),
         ..Recording::default()
     };
     run("stations.csv", if held { Role::Holdout } else { Role::Fit }, recording)
@@ -145,68 +102,14 @@ fn a_hundred_and_thirty_three_stations_are_enough_for_an_encoder() {
     assert!(i.calibration.hypothesis.members.is_empty() && i.calibration.hypothesis.angle_table.is_some());
 }
 
-/// Two channels with offset, gain, skew and a cubic, in units of `unit` a volt.
-fn channels(angles_deg: &[f64], unit: f64, cubic: f64, noise_v: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let mut noise = Noise::new(seed);
-    let c = |u: f64| u + 0.75 * cubic * u * u * u;
-    angles_deg
-        .iter()
-        .map(|a| {
-            let (sin, cos) = a.to_radians().sin_cos();
-            let (x, y) = (c(cos), c(sin));
-            let (x, y) = (0.02 + x + noise_v * noise.next(), -0.03 + 1.06 * (y + 0.01 * x) + noise_v * noise.next());
-            (unit * x, unit * y)
-        })
-        .unzip()
-}
-
-fn stations(unit: f64, role: Role, seed: u64) -> Run {
-    let angles: Vec<f64> = (0..48).map(|i| f64::from(i % 24) * 15.0 * if i < 24 { 1.0 } else { -1.0 }).collect();
-    let (x, y) = channels(&angles, unit, 0.0, 2e-4, seed);
-    let recording = Recording {
-        t_s: (0..48).map(f64::from).collect(),
-        table_deg: Some(angles),
-        xc_v: Some(x),
-        yc_v: Some(y),
-        ..Recording::default()
-    };
-    run("stations.csv", role, recording)
-}
-
-#[test]
-fn twenty_four_stations_each_way_tell_offset_gain_and_skew() {
-    let i = identified(sensor(vec![stations(1.0, Role::Fit, 3), stations(1.0, Role::Holdout, 4)]));
-    let ratio = i.report.detection_gain_ratio.unwrap();
-    assert!((ratio.value - 1.06).abs() < 1e-3 && ratio.half_width() < 1e-3, "{ratio:?}");
-    assert!(find(&i, "detection-offset").is_some() && find(&i, "detection-skew").is_some());
-    assert!(held_out(&i) < 0.03, "{}", held_out(&i));
-}
-
-#[test]
-fn volts_millivolts_and_counts_give_the_same_answer() {
-    let of = |unit: f64| identified(sensor(vec![stations(unit, Role::Fit, 3), stations(unit, Role::Holdout, 4)]));
-    let volts = of(1.0);
-    for unit in [1e-6, 1e3, 1e9] {
-        let other = of(unit);
-        let [a, b] = [&volts, &other].map(|i| i.report.detection_gain_ratio.unwrap());
-        assert!(
-            (a.value - b.value).abs() < 1e-9 && (a.half_width() - b.half_width()).abs() < 1e-9,
-            "{unit}: {a:?} {b:?}"
-        );
-        let offset = |i: &Identification| find(i, "detection-offset").unwrap().parameters[0].value;
-        assert!((offset(&other) / unit / offset(&volts) - 1.0).abs() < 1e-6, "{unit}");
-        assert!((held_out(&volts) - held_out(&other)).abs() < 1e-9, "{unit}");
-    }
-}
-
 #[test]
 fn hard_iron_far_above_the_amplitude_is_centred() {
     let angles: Vec<f64> = (0..76).map(|i| f64::from(i) * 4.9).collect();
     let magnetometer = |role, seed| {
         let mut noise = Noise::new(seed);
         let read = |f: fn(f64) -> f64, o: f64, n: f64, a: &f64| (o + 110.0 * f(a.to_radians()) + 0.8 * n).round();
-        let x = angles.iter().map(|a| read(f64::cos, 1575.0, noise.next(), a)).collect();
-        let y = angles.iter().map(|a| read(f64::sin, -890.0, noise.next(), a)).collect();
+        let x = angles.iter().map(|a| read(f64::cos, 1575.0, noise.sample(), a)).collect();
+        let y = angles.iter().map(|a| read(f64::sin, -890.0, noise.sample(), a)).collect();
         let recording = Recording {
             t_s: (0..76).map(f64::from).collect(),
             table_deg: Some(angles.clone()),
@@ -229,9 +132,11 @@ fn hard_iron_far_above_the_amplitude_is_centred() {
 fn clipped(role: Role, seed: u64) -> Run {
     let mut noise = Noise::new(seed);
     let angles: Vec<f64> = (0..3000).map(|i| f64::from(i) * 1.237).collect();
-    let x =
-        angles.iter().map(|a| (10.0 + 530.0 * a.to_radians().cos() + 0.6 * noise.next()).round().min(511.0)).collect();
-    let y = angles.iter().map(|a| (500.0 * a.to_radians().sin() + 0.6 * noise.next()).round()).collect();
+    let x = angles
+        .iter()
+        .map(|a| (10.0 + 530.0 * a.to_radians().cos() + 0.6 * noise.sample()).round().min(511.0))
+        .collect();
+    let y = angles.iter().map(|a| (500.0 * a.to_radians().sin() + 0.6 * noise.sample()).round()).collect();
     let recording = Recording {
         t_s: (0..3000).map(|i| f64::from(i) * 0.01).collect(),
         table_deg: Some(angles),
@@ -264,10 +169,10 @@ fn a_commanded_reference_is_not_believed_and_the_radius_tells_the_gain() {
             a + 5.0 * a.to_radians().sin() + 3.0 * (2.0 * a.to_radians()).cos() + 4.0 * (0.04 * a.to_radians()).sin()
         };
         let angles: Vec<f64> = t.iter().map(turn).collect();
-        let x = angles.iter().map(|a| 2.1 + 0.23 * a.to_radians().cos() * (1.0 + 0.03 * noise.next())).collect();
+        let x = angles.iter().map(|a| 2.1 + 0.23 * a.to_radians().cos() * (1.0 + 0.03 * noise.sample())).collect();
         let y = angles
             .iter()
-            .map(|a| 2.0 + 0.2 * (a.to_radians().sin() - 0.1 * a.to_radians().cos()) * (1.0 + 0.03 * noise.next()))
+            .map(|a| 2.0 + 0.2 * (a.to_radians().sin() - 0.1 * a.to_radians().cos()) * (1.0 + 0.03 * noise.sample()))
             .collect();
         let rate_dps = Some(vec![360.0 * 1.55; t.len()]);
         let recording = Recording { t_s: t, rate_dps, xc_v: Some(x), yc_v: Some(y), ..Recording::default() };
@@ -305,14 +210,14 @@ fn rate_gyroscope(seed: u64) -> Run {
     let (mut t_s, mut table, mut theta) = (vec![], vec![], vec![]);
     for i in 0..6000 {
         // motion of a body: a rate that wanders and returns
-        rate += -0.5 * rate * dt + 60.0 * dt.sqrt() * noise.next();
-        cross += -0.5 * cross * dt + 60.0 * dt.sqrt() * noise.next();
+        rate += -0.5 * rate * dt + 60.0 * dt.sqrt() * noise.sample();
+        cross += -0.5 * cross * dt + 60.0 * dt.sqrt() * noise.sample();
         angle += rate * dt;
         other += cross * dt;
         let t = f64::from(i) * dt;
         t_s.push(t);
         table.push(angle);
-        theta.push(0.997 * angle + 0.08 * t - 0.01 * rate + 0.0003 * other + 0.01 * noise.next());
+        theta.push(0.997 * angle + 0.08 * t - 0.01 * rate + 0.0003 * other + 0.01 * noise.sample());
     }
     let recording = Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() };
     run("turn.csv", Role::Fit, recording)
@@ -333,6 +238,26 @@ fn a_rate_gyroscope_is_never_made_worse_and_its_lag_is_found() {
     }
 }
 
+#[test]
+fn the_bias_of_a_rate_gyroscope_that_hardly_turns_is_told_all_the_same() {
+    let mut noise = Noise::new(11);
+    let (mut t_s, mut table, mut theta, mut walk) = (vec![], vec![], vec![], 0.0);
+    for i in 0..6000 {
+        let t = f64::from(i) * 0.02;
+        let angle = 20.0 * (0.5 * t).sin();
+        walk += 0.002 * noise.sample();
+        t_s.push(t);
+        table.push(angle);
+        theta.push(angle + 0.05 * t + walk);
+    }
+    let recording = Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() };
+    let runs = vec![run("hand.csv", Role::Fit, recording)];
+    let i = identified(Campaign { instrument: Instrument::Gyroscope, ..sensor(runs) });
+    let bias = find(&i, "rate-offset").unwrap_or_else(|| panic!("{:#?}", i.report));
+    assert!((bias.parameters[0].value.to_degrees() - 0.05).abs() < 0.005, "{bias:?}");
+    assert!(held_out(&i) < 0.25 * i.report.heldout.raw.unwrap().rms_deg, "{:?}", i.report.heldout);
+}
+
 /// Slow noise and nothing else.
 fn remembered(seed: u64, memory: f64, turns: f64) -> Run {
     let mut noise = Noise::new(seed);
@@ -342,7 +267,7 @@ fn remembered(seed: u64, memory: f64, turns: f64) -> Run {
     let theta = angles
         .iter()
         .map(|a| {
-            last = memory * last + (1.0 - memory * memory).sqrt() * noise.next();
+            last = memory * last + (1.0 - memory * memory).sqrt() * noise.sample();
             a + 0.05 * last
         })
         .collect();

@@ -187,18 +187,25 @@ pub(crate) struct Candidate<M> {
     pub(crate) size: usize,
     pub(crate) model: M,
     pub(crate) losses: Losses,
+    /// of the radius, where its readout says something of it
+    pub(crate) of_radius: Option<Losses>,
 }
 
-/// The simplest candidate that is as good as the best. Ties of size go to the smaller loss, and ties of that to the
-/// order of the models: the order in which they were tried has no say.
+/// The simplest candidate that is as good as the best. A readout is also seen in the radius: of candidates that predict the
+/// angle alike, those remain that predict the radius as well as the best of them. Ties of size go to the smaller loss, and
+/// ties of that to the order of the models: the order in which they were tried has no say.
 pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>]) -> Option<&Candidate<M>> {
     let by_loss = |a: &&Candidate<M>, b: &&Candidate<M>| {
         a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
     };
     let best = candidates.iter().min_by(by_loss)?;
-    candidates
+    let by_angle: Vec<_> = candidates.iter().filter(|c| c.losses.is_as_good_as(&best.losses)).collect();
+    let radii = by_angle.iter().filter_map(|c| c.of_radius.as_ref());
+    let roundest = radii.min_by(|a, b| a.total().total_cmp(&b.total()));
+    by_angle
         .iter()
-        .filter(|c| c.losses.is_as_good_as(&best.losses))
+        .copied()
+        .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best)))
         .min_by(|a, b| a.size.cmp(&b.size).then_with(|| by_loss(a, b)))
 }
 
@@ -207,7 +214,7 @@ mod tests {
     use super::*;
 
     fn candidate(size: usize, model: &'static str, sum: [f64; 4]) -> Candidate<&'static str> {
-        Candidate { size, model, losses: Losses { sum: sum.to_vec(), rows: 4 } }
+        Candidate { size, model, losses: Losses { sum: sum.to_vec(), rows: 4 }, of_radius: None }
     }
 
     #[test]
@@ -227,6 +234,20 @@ mod tests {
             // as good as the best within a standard error, the simplest, and of two alike the first by name
             assert_eq!(choose(&candidates).map(|c| c.model), Some("lag"));
         }
+    }
+
+    #[test]
+    fn of_models_that_predict_the_angle_alike_the_one_that_makes_the_radius_round_is_chosen() {
+        let mut candidates = [
+            candidate(8, "table", [1.0, 1.1, 1.05, 1.0]),
+            candidate(2, "offset", [1.0, 1.1, 1.06, 0.99]),
+            candidate(4, "affine", [1.0, 1.1, 1.04, 1.0]),
+            candidate(5, "cubic", [1.0, 1.1, 1.04, 1.0]),
+        ];
+        for (c, radius) in candidates.iter_mut().zip([9.0, 4.0, 1.1, 1.1]) {
+            c.of_radius = Some(Losses { sum: vec![radius, radius * 1.1, radius * 0.9, radius], rows: 4 });
+        }
+        assert_eq!(choose(&candidates).map(|c| c.model), Some("affine"));
     }
 
     #[test]

@@ -55,7 +55,9 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let head = Head::of(&campaign);
     (options.progress)("preparing the runs");
     let (fitted, held) = prepare(campaign)?;
-    require_a_turn(&fitted, stated.unwrap_or(1.0))?;
+    if !rate_gyroscope {
+        require_a_turn(&fitted, stated.unwrap_or(1.0))?;
+    }
     if held.iter().map(SensorRun::len).sum::<usize>() < FEWEST_HELD_ROWS {
         return Err(Refusal::no_answer(
             "campaign",

@@ -1,9 +1,12 @@
 //! Isolated harmonics of the reference's turn beyond the table: steps of a motor, teeth, poles. The strongest ordinate of
 //! the periodogram is taken where its false-alarm probability over all that were tried is small: ordinates of noise are
-//! exponential, and their median is ln 2 times their mean.
+//! exponential, and their median is ln 2 times their mean. Where stations meet a line at one phase only, its ordinate has
+//! one degree of freedom instead of two.
+
+use statrs::function::erf::erfc;
 
 use super::samples::span;
-use super::table_fit::{Sample, TableFit};
+use super::table_fit::{Sample, TableFit, only_phase};
 use crate::estimation::statistics::median;
 
 /// False-alarm probability over all lines tried.
@@ -32,7 +35,10 @@ pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_t
     let powers: Vec<f64> = tried.iter().map(|n| power(f64::from(*n), &reference, &left)).collect();
     let mean = median(&mut powers.clone()) / std::f64::consts::LN_2;
     let (at, strongest) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    let by_chance = -(-(-strongest / mean).exp()).ln_1p() * tried.len() as f64;
+    let ratio = strongest / mean;
+    let one_phase = only_phase(f64::from(tried[at]), samples).is_some();
+    let alone = if one_phase { erfc((0.5 * ratio).sqrt()) } else { (-ratio).exp() };
+    let by_chance = -(-alone).ln_1p() * tried.len() as f64;
     (-(-by_chance).exp_m1() < FALSE_ALARM).then(|| tried[at])
 }
 

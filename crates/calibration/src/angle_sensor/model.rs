@@ -3,7 +3,7 @@
 use super::cross_validation::{Candidate, Folds, Losses, choose, losses_of_radius};
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
-use super::readout_fit::{Weighting, fit};
+use super::readout_fit::{Weighting, centre, fit};
 use super::samples::SensorRun;
 use super::selection::{Selected, Selection, fit_from, starts};
 use super::sensor::Sensor;
@@ -87,14 +87,25 @@ impl SensorModel {
             }
         };
         let samples = sensor.samples(runs, readout.as_ref().map(|r| &r.0));
-        let table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
-        let plain = sensor.samples(runs, None);
-        let gain = autoregression::gain(
-            &by_run(&plain, runs.len(), |s| s.error),
-            &by_run(&samples, runs.len(), |s| table.left(s)),
-            selected.size,
-        );
-        let (predicted, predicted_raw) = (selected.losses.rms(), selected.raw.as_ref().map(Losses::rms));
+        let errors = by_run(&samples, runs.len(), |s| s.error);
+        let raw_errors = by_run(&sensor.samples(runs, None), runs.len(), |s| s.error);
+        let mut table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
+        let mut predicted = selected.losses.rms();
+        let left = by_run(&samples, runs.len(), |s| table.left(s));
+        let unknowns = readout.as_ref().map_or(0, |r| r.0.kind.free().len()) + shape.size();
+        let mut gain = autoregression::gain(&raw_errors, &left, unknowns);
+        if gain <= 0.0
+            && let (Some((found, _)), Some(alone)) = (&readout, &selected.readout_alone)
+            && found.kind != Kind::Plain
+        {
+            // what the memory of the noise explains as well is no table; a readout shows in the radius, too
+            let raw = Readout { rails: found.rails, ..Readout::plain() };
+            gain = autoregression::gain(&raw_errors, &errors, found.kind.free().len())
+                + autoregression::gain(&ln_radius(runs, &raw), &ln_radius(runs, found), 0);
+            table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
+            predicted = alone.rms();
+        }
+        let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let helps = predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
         let model =
             Self { sensor, outcome: Outcome::Answered, readout, table, predicted, predicted_raw, by_radius: false };
@@ -125,7 +136,7 @@ impl SensorModel {
                     fit(kind, Weighting::Radius, &kept, sensor.gain, &start).map(|f| f.readout)
                 };
                 let losses = losses_of_radius(without, &folds, runs)?;
-                Some(Candidate { size: kind.free().len(), model: kind, losses })
+                Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
             })
             .collect();
         let chosen = choose(&candidates).ok_or_else(|| refuse("no ellipse fits the channels".into()))?;
@@ -161,15 +172,23 @@ impl SensorModel {
     }
 }
 
+/// ln of the radius behind the readings of each run, off the rails, about its mean.
+fn ln_radius(runs: &[SensorRun], readout: &Readout) -> Vec<Vec<f64>> {
+    let of_run = |run: &SensorRun| {
+        let kept = run.channels().into_iter().flatten().filter(|z| !readout.rails.clips(**z));
+        let mut out: Vec<f64> = kept.map(|z| readout.ln_radius(*z)).collect();
+        centre(&mut out);
+        out
+    };
+    runs.iter().map(of_run).collect()
+}
+
 /// A value of the samples of each run.
 pub(crate) fn by_run(samples: &[Sample], runs: usize, value: impl Fn(&Sample) -> f64) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); runs];
     for s in samples {
         out[s.run].push(value(s));
     }
-    for v in &mut out {
-        let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
-        v.iter_mut().for_each(|x| *x -= mean);
-    }
+    out.iter_mut().for_each(|v| centre(v));
     out
 }

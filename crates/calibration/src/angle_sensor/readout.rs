@@ -28,6 +28,9 @@ pub(crate) enum Kind {
 pub(crate) const UNKNOWNS: usize = 6;
 
 impl Kind {
+    /// The kinds with something to fit.
+    pub(crate) const FITTED: [Self; 4] = [Self::Offset, Self::Affine, Self::Cubic, Self::CubicPerChannel];
+
     /// Indices of the parameters that are adjusted.
     pub(crate) fn free(self) -> &'static [usize] {
         match self {
@@ -117,6 +120,12 @@ impl Readout {
         let y = ((z[1] - self.centre[1]) / self.amplitude - p[1]) / p[2].exp() - p[3] * x;
         let [kx, ky] = self.cubics();
         [without_cubic(x, kx), without_cubic(y, ky)]
+    }
+
+    /// ln of the radius behind a reading.
+    pub(crate) fn ln_radius(&self, z: [f64; 2]) -> f64 {
+        let [x, y] = self.undo(z);
+        0.5 * (x * x + y * y + 1e-18).ln()
     }
 
     /// The angle behind a reading, rad. A channel at its rail says only "at least": the other one and the radius tell.

@@ -84,7 +84,8 @@ fn residuals(readout: &Readout, runs: &[SensorRun], harmonic_gain: f64, with_ang
     out
 }
 
-fn centre(values: &mut [f64]) {
+/// Takes the mean out.
+pub(crate) fn centre(values: &mut [f64]) {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     for v in values {
         *v -= mean;
@@ -101,7 +102,8 @@ pub(crate) fn fit(
 ) -> Option<ReadoutFit> {
     let begun = start.of_kind(kind);
     if kind == Kind::Plain {
-        return Some(ReadoutFit { readout: begun, cost: 0.0 });
+        let radius = mean_radius(&begun, runs);
+        return Some(ReadoutFit { readout: Readout { radius, ..begun }, cost: 0.0 });
     }
     let mut weights = weighting.weights();
     let mut fitted = ReadoutFit { readout: begun.clone(), cost: 0.0 };
@@ -120,10 +122,7 @@ pub(crate) fn fit(
 /// Geometric mean of the radius over rows away from any rail.
 fn mean_radius(readout: &Readout, runs: &[SensorRun]) -> f64 {
     let readings = runs.iter().filter_map(SensorRun::channels).flatten().filter(|z| !readout.rails.clips(**z));
-    let (n, sum) = readings.fold((0.0, 0.0), |(n, sum), z| {
-        let [x, y] = readout.undo(*z);
-        (n + 1.0, sum + 0.5 * (x * x + y * y + 1e-18).ln())
-    });
+    let (n, sum) = readings.fold((0.0, 0.0), |(n, sum), z| (n + 1.0, sum + readout.ln_radius(*z)));
     if n > 0.0 { (sum / n).exp() } else { 1.0 }
 }
 

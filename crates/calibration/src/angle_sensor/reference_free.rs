@@ -188,7 +188,7 @@ fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64
         .filter(|kind| *kind < Kind::Cubic || gap < LARGEST_GAP_OF_A_CUBIC_DEG)
         .filter_map(|kind| {
             let losses = losses_of_radius(|fold| fitted(kind, &folds.without(runs, fold)), &folds, runs)?;
-            Some(Candidate { size: kind.free().len(), model: kind, losses })
+            Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
         })
         .collect();
     let chosen = choose(&candidates).ok_or_else(no_ellipse)?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::cross_validation::{Candidate, Folds, Losses, choose, cross_validate};
+use super::cross_validation::{Candidate, Folds, Losses, choose, cross_validate, losses_of_radius};
 use super::ellipse;
 use super::lines::strongest_line;
 use super::rails::Rails;
@@ -23,11 +23,13 @@ const COARSE_ORDERS: [usize; 2] = [0, 4];
 const MOTION_ORDERS: [usize; 2] = [4, 12];
 /// Lengths offered anew beside an isolated line go up to this.
 const ORDER_BESIDE_LINES: usize = 12;
-/// Rows that a model needs for each of its unknowns: with 34 rows it allows offset, gain, skew and two harmonics.
-const ROWS_PER_UNKNOWN: usize = 4;
+/// Observations that a model needs for each of its unknowns, an engineering choice. A row observes the angle, and of two
+/// channels the radius too. A readout alone explains both, so that 17 stations allow offset, gain and skew; beside a table,
+/// which lives in the angle, it has the angle to share: 34 rows allow those and two harmonics.
+const OBSERVATIONS_PER_UNKNOWN: usize = 4;
 /// Rows beyond which selection looks at every so many only.
 const ENOUGH_ROWS: usize = 1500;
-/// Readouts that are offered every length of the table.
+/// Kinds of readout that are offered every length of the table.
 const FINALISTS: usize = 3;
 /// Isolated lines at most.
 const MOST_LINES: usize = 6;
@@ -43,8 +45,9 @@ pub(crate) type Model = (Option<Front>, Shape);
 #[derive(Debug, Clone)]
 pub(crate) struct Selected {
     pub(crate) model: Model,
-    pub(crate) size: usize,
     pub(crate) losses: Losses,
+    /// those of its readout without a table
+    pub(crate) readout_alone: Option<Losses>,
     /// those of the sensor as it is
     pub(crate) raw: Option<Losses>,
 }
@@ -56,8 +59,16 @@ pub(crate) struct Selection<'a> {
     folds: Folds,
     rails: Rails,
     starts: Vec<Readout>,
-    /// samples without each fold, by readout
-    without: BTreeMap<Option<Front>, Option<Vec<Vec<Sample>>>>,
+    /// what each readout makes of the rows when it is fitted without each fold
+    without: BTreeMap<Option<Front>, Option<WithoutFolds>>,
+}
+
+/// A readout that was fitted without each fold.
+struct WithoutFolds {
+    /// all rows, by fold; one entry for all where nothing is fitted
+    samples: Vec<Vec<Sample>>,
+    /// how well it predicts the radius; `None` where there are no channels
+    of_radius: Option<Losses>,
 }
 
 impl<'a> Selection<'a> {
@@ -74,7 +85,7 @@ impl<'a> Selection<'a> {
     pub(crate) fn select(&mut self) -> Option<Selected> {
         let constant = Shape::constant(self.sensor.free_gain);
         let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
-        let raw = self.offer(&[plain], &[constant]).pop();
+        let raw = self.offer(&[plain], std::slice::from_ref(&constant)).pop();
         let mut pool = Vec::new();
         let fronts = if self.channels() { self.readouts(&mut pool)? } else { vec![None] };
         let motions = self.motions(fronts[0]);
@@ -84,35 +95,33 @@ impl<'a> Selection<'a> {
             let Some(better) = self.with_a_line(&chosen) else { break };
             chosen = better;
         }
-        Some(Selected { model: chosen.model, size: chosen.size, losses: chosen.losses, raw: raw.map(|c| c.losses) })
+        let readout_alone = self.offer(&[chosen.model.0], &[constant]).pop().map(|c| c.losses);
+        Some(Selected { model: chosen.model, losses: chosen.losses, readout_alone, raw: raw.map(|c| c.losses) })
     }
 
     fn channels(&self) -> bool {
         self.runs.iter().all(|r| matches!(r.reading, Reading::Channels(_)))
     }
 
-    /// Who is to be believed is settled with the affine readout; cubics inherit it. The best few remain.
+    /// Every readout with every weighting, without a table and beside one; the best few kinds remain, each with the
+    /// weighting that predicts best.
     fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Option<Vec<Option<Front>>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
         let mut fronts = vec![Some((Kind::Plain, Weighting::Equal))];
         if !self.starts.is_empty() {
-            fronts.extend([Kind::Offset, Kind::Affine].iter().flat_map(|k| Weighting::ALL.map(|w| Some((*k, w)))));
+            fronts.extend(Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| Some((*k, w)))));
         }
-        let mut first = self.offer(&fronts, &coarse);
-        let affine: Vec<_> = first.iter().filter(|c| c.model.0.is_some_and(|f| f.0 == Kind::Affine)).cloned().collect();
-        if let Some((_, weighting)) = choose(&affine).and_then(|c| c.model.0) {
-            first.extend(
-                self.offer(&[Some((Kind::Cubic, weighting)), Some((Kind::CubicPerChannel, weighting))], &coarse),
-            );
-        }
-        let mut best: BTreeMap<Option<Front>, f64> = BTreeMap::new();
+        let first = self.offer(&fronts, &coarse);
+        let mut best: BTreeMap<Option<Kind>, (f64, Option<Front>)> = BTreeMap::new();
         for c in &first {
-            let least = best.entry(c.model.0).or_insert(f64::INFINITY);
-            *least = least.min(c.losses.rms());
+            let least = best.entry(c.model.0.map(|f| f.0)).or_insert((f64::INFINITY, c.model.0));
+            if c.losses.rms() < least.0 {
+                *least = (c.losses.rms(), c.model.0);
+            }
         }
-        let mut ranked: Vec<_> = best.into_iter().collect();
-        ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let finalists: Vec<_> = ranked.into_iter().take(FINALISTS).map(|(f, _)| f).collect();
+        let mut ranked: Vec<_> = best.into_values().collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        let finalists: Vec<_> = ranked.into_iter().take(FINALISTS).map(|(_, f)| f).collect();
         pool.extend(first.into_iter().filter(|c| !finalists.contains(&c.model.0)));
         (!finalists.is_empty()).then_some(finalists)
     }
@@ -126,12 +135,14 @@ impl<'a> Selection<'a> {
         if deviation <= VARYING_RATE * fastest {
             return vec![Motion::None];
         }
-        let steady = speed_is_one(&rates, fastest);
-        let all = if steady {
-            vec![Motion::None, Motion::Direction]
-        } else {
-            vec![Motion::None, Motion::Direction, Motion::Rate, Motion::RateAndAcceleration]
-        };
+        let mut all = vec![Motion::None];
+        // one way only, a constant that changes sign with the direction is a constant
+        if rates.iter().any(|r| *r > VARYING_RATE * fastest) && rates.iter().any(|r| *r < -VARYING_RATE * fastest) {
+            all.push(Motion::Direction);
+        }
+        if !speed_is_one(&rates, fastest) {
+            all.extend([Motion::Rate, Motion::RateAndAcceleration]);
+        }
         let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));
         match choose(&trial).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
@@ -163,32 +174,46 @@ impl<'a> Selection<'a> {
             .into_par_iter()
             .filter_map(|(front, shape)| {
                 let size = front.map_or(0, |f| f.0.free().len()) + shape.size();
-                if (size + self.runs.len()) * ROWS_PER_UNKNOWN > rows {
+                if !self.carries(rows, front, shape) {
                     return None;
                 }
-                let samples = self.without.get(&front)?.as_ref()?;
+                let WithoutFolds { samples, of_radius } = self.without.get(&front)?.as_ref()?;
                 // without a readout to fit all folds have the same samples
                 let without = |fold: usize| samples.get(fold.min(samples.len() - 1)).map(Vec::as_slice);
                 let losses = cross_validate(without, &self.folds, shape, self.runs.len(), self.sensor.cycles)?;
-                Some(Candidate { size, model: (front, shape.clone()), losses })
+                Some(Candidate { size, model: (front, shape.clone()), losses, of_radius: of_radius.clone() })
             })
             .collect()
     }
 
-    fn fit_without_each_fold(&self, front: Option<Front>) -> Option<Vec<Vec<Sample>>> {
-        let Some((kind, weighting)) = front.filter(|f| f.0 != Kind::Plain) else {
-            let readout = front.map(|_| Readout::plain());
-            return Some(vec![self.sensor.samples(&self.runs, readout.as_ref())]);
+    /// Whether so many rows observe enough for a readout and a shape.
+    fn carries(&self, rows: usize, front: Option<Front>, shape: &Shape) -> bool {
+        let of_readout = front.map_or(0, |f| f.0.free().len());
+        let alone = of_readout > 0 && *shape == Shape::constant(self.sensor.free_gain);
+        let observations = if alone { 2 * rows } else { rows };
+        (of_readout + shape.size() + self.runs.len()) * OBSERVATIONS_PER_UNKNOWN <= observations
+    }
+
+    fn fit_without_each_fold(&self, front: Option<Front>) -> Option<WithoutFolds> {
+        let Some((kind, weighting)) = front else {
+            return Some(WithoutFolds { samples: vec![self.sensor.samples(&self.runs, None)], of_radius: None });
         };
-        let whole = self.fit_readout(kind, weighting, &self.runs)?;
-        (0..self.folds.count)
+        let whole = match kind {
+            Kind::Plain => Readout { rails: self.rails, ..Readout::plain() },
+            _ => self.fit_readout(kind, weighting, &self.runs)?.readout,
+        };
+        let readouts: Vec<Readout> = (0..self.folds.count)
             .map(|fold| {
                 let kept = self.folds.without(&self.runs, fold);
-                let gain = self.sensor.gain;
-                let fitted = fit(kind, weighting, &kept, gain, &whole.readout)?;
-                Some(self.sensor.samples(&self.runs, Some(&fitted.readout)))
+                fit(kind, weighting, &kept, self.sensor.gain, &whole).map(|f| f.readout)
             })
-            .collect()
+            .collect::<Option<_>>()?;
+        let samples = match kind {
+            Kind::Plain => vec![self.sensor.samples(&self.runs, Some(&Readout::plain()))],
+            _ => readouts.iter().map(|r| self.sensor.samples(&self.runs, Some(r))).collect(),
+        };
+        let of_radius = losses_of_radius(|fold| readouts.get(fold).cloned(), &self.folds, &self.runs);
+        Some(WithoutFolds { samples, of_radius })
     }
 
     fn fit_readout(&self, kind: Kind, weighting: Weighting, runs: &[SensorRun]) -> Option<ReadoutFit> {

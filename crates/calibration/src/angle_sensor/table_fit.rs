@@ -115,6 +115,22 @@ fn push_harmonics(angle: f64, order: usize, out: &mut Vec<f64>) {
     }
 }
 
+/// Share of a line's power below which its weaker phase is not seen: engineering choice.
+const UNSEEN_PHASE: f64 = 0.01;
+
+/// Stations at twice a line's frequency meet it at one phase (and its opposite) only: the direction of that phase among
+/// cosine and sine. `None` where both are seen.
+pub(crate) fn only_phase(n: f64, samples: &[Sample]) -> Option<[f64; 2]> {
+    // cos and sin of twice the phase: their length is the share of the stronger phase less that of the weaker
+    let (c, s) = samples.iter().fold((0.0, 0.0), |(c, s), sample| {
+        let (sin, cos) = (2.0 * n * sample.reference).sin_cos();
+        (c + cos, s + sin)
+    });
+    let weaker = 0.5 * (1.0 - c.hypot(s) / samples.len().max(1) as f64);
+    let (sin, cos) = (0.5 * s.atan2(c)).sin_cos();
+    (weaker < UNSEEN_PHASE).then_some([cos, sin])
+}
+
 impl TableFit {
     /// Fits the shape to samples of `runs` runs; `None` where the forward form has no inverse.
     pub(crate) fn new(shape: &Shape, samples: &[Sample], runs: usize, cycles: f64) -> Option<Self> {
@@ -131,6 +147,8 @@ impl TableFit {
         let mut x = vec![0.0; present + side + 2 * order];
         let mut row = Vec::with_capacity(x.len());
         let mut sides = Vec::with_capacity(side);
+        let phases: Vec<Option<[f64; 2]>> = shape.lines.iter().map(|n| only_phase(f64::from(*n), samples)).collect();
+        let first_line = side - 2 * shape.lines.len();
         for _ in 0..if forward { STEPS } else { 1 } {
             let table = series(shape.form, &x[present + side..]);
             let mut equations = NormalEquations::new(x.len());
@@ -138,6 +156,11 @@ impl TableFit {
                 let own = column[s.run]?;
                 sides.clear();
                 side_columns(shape, s, &mut sides);
+                for (pair, phase) in sides[first_line..].chunks_exact_mut(2).zip(&phases) {
+                    if let Some([u, v]) = phase {
+                        pair.copy_from_slice(&[u * pair[0] + v * pair[1], 0.0]);
+                    }
+                }
                 let moved = x[own] + sides.iter().zip(&x[present..]).map(|(a, b)| a * b).sum::<f64>();
                 let at = if forward { s.theta - s.error + moved } else { s.theta };
                 let (value, slope) = if forward { table.at(at, cycles) } else { (0.0, 0.0) };
@@ -154,6 +177,11 @@ impl TableFit {
             }
             if step.iter().all(|d| d.abs() < CONVERGED) {
                 break;
+            }
+        }
+        for (pair, phase) in x[present + first_line..present + side].chunks_exact_mut(2).zip(&phases) {
+            if let Some([u, v]) = phase {
+                pair.copy_from_slice(&[u * pair[0], v * pair[0]]);
             }
         }
         let fitted = Self {
@@ -199,6 +227,23 @@ mod tests {
                 Sample { theta, error: theta - reference, reference, rate, acceleration: 0.0, run: 0 }
             })
             .collect()
+    }
+
+    #[test]
+    fn a_line_at_half_the_spacing_of_stations_is_fitted_at_the_one_phase_that_they_see() {
+        for start in [0.0, 0.03] {
+            let samples: Vec<Sample> = (0..36)
+                .map(|i| {
+                    let reference = f64::from(i).mul_add(10f64.to_radians(), start);
+                    let error = 1e-3 * (18.0 * (reference - start)).cos();
+                    Sample { theta: reference + error, error, reference, rate: 1.0, acceleration: 0.0, run: 0 }
+                })
+                .collect();
+            let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![18], free_gain: false };
+            let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
+            assert!(samples.iter().all(|s| fitted.left(s).abs() < 1e-9));
+            assert!((fitted.side[0].hypot(fitted.side[1]) - 1e-3).abs() < 1e-9, "{:?}", fitted.side);
+        }
     }
 
     #[test]
