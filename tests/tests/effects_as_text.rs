@@ -121,6 +121,7 @@ fn file(stage: &str, map: &[(String, String)]) -> String {
         id: "my-effect".into(),
         summary: String::new(),
         stage: stage.into(),
+        first: false,
         onsets: Vec::new(),
         parameter: ["k", "m"]
             .map(|name| cvg_calibration::ParameterText {

@@ -30,10 +30,11 @@ impl Stages {
     /// Sorts `effects`, given in any order.
     pub fn new(effects: &[Setting]) -> Self {
         let mut stages = Self::default();
-        // what was written down as text acts after what the library has
-        let written = effects.iter().filter(|(id, _)| !id.in_library());
+        // what was written down as text acts before or after what the library has
+        let written =
+            |first: bool| effects.iter().filter(move |(id, _)| !id.in_library() && id.acts_on_angle() == first);
         let library = EffectId::ALL.iter().flat_map(|id| effects.iter().filter(move |(e, _)| e == id));
-        for setting in library.chain(written) {
+        for setting in written(true).chain(library).chain(written(false)) {
             let (id, values) = setting;
             let list = match id.description().stage {
                 Stage::Input if follows_table(*id, values) => &mut stages.table,

@@ -128,7 +128,7 @@ impl Calibration {
                         .map(|(p, v)| (p.name.to_string(), v))
                         .collect(),
                     text: match m.id {
-                        EffectId::Written(written) => Some(written.text.to_owned()),
+                        EffectId::WrittenFirst(written) | EffectId::Written(written) => Some(written.text.to_owned()),
                         _ => None,
                     },
                 })

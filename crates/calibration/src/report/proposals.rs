@@ -118,7 +118,9 @@ impl Witness<'_> {
             members.map(|m| Part { scaling: m.values[3], size_rad: m.values[1].hypot(m.values[2]) }).collect();
         let directions = parts.iter().any(|p| p.scaling == harmonic_n::scaling::DIRECTION);
         let scaling = self.scaling(&self.without(|_, m| is_part(m)), Follows::Pattern, n, directions);
-        self.harmonic(n, &parts, &scaling)
+        let text = self.harmonic(n, &parts, &scaling);
+        // as what corrects it
+        EffectText { first: text.stage == "readout", ..text }
     }
 
     /// What was seen and not corrected.
@@ -395,6 +397,7 @@ fn text<const N: usize>(
         id: String::new(),
         summary,
         stage: stage.into(),
+        first: false,
         onsets: Vec::new(),
         parameter,
         map: map.into_iter().map(|(key, value)| (key.to_owned(), value)).collect(),

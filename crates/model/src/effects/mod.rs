@@ -286,6 +286,9 @@ macro_rules! library {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[allow(missing_docs, reason = "each variant is the effect of its name, documented in its own file")]
         pub enum EffectId {
+            /// an effect outside the library, written down as text, that acts before all of the library's
+            #[cfg(feature = "written")]
+            WrittenFirst(&'static written::Written),
             $($name,)+
             /// an effect outside the library, written down as text; a readout effect acts after all of the library's
             #[cfg(feature = "written")]
@@ -301,7 +304,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => const { &<$effect as Effect>::DESCRIPTION },)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => &text.description,
+                    Self::WrittenFirst(text) | Self::Written(text) => &text.description,
                 }
             }
 
@@ -310,7 +313,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => const { <$effect as Effect>::IN_TIME },)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.in_time,
+                    Self::WrittenFirst(text) | Self::Written(text) => text.in_time,
                 }
             }
 
@@ -319,7 +322,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS },)+
                     #[cfg(feature = "written")]
-                    Self::Written(_) => false,
+                    Self::WrittenFirst(_) | Self::Written(_) => false,
                 }
             }
 
@@ -329,7 +332,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::input_rate(p, rate_rad_s, at),)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.input_rate(p, rate_rad_s, at),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.input_rate(p, rate_rad_s, at),
                 }
             }
 
@@ -339,7 +342,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::mechanics(p, e),)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.mechanics(p, e),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.mechanics(p, e),
                 }
             }
 
@@ -349,7 +352,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::actuate(p, f),)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.actuate(p, f),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.actuate(p, f),
                 }
             }
 
@@ -359,7 +362,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::read(p, e, at),)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.read(p, e, at),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.read(p, e, at),
                 }
             }
 
@@ -369,7 +372,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::unread(p, e, at),)+
                     #[cfg(feature = "written")]
-                    Self::Written(text) => text.unread(p, e, at),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.unread(p, e, at),
                 }
             }
 
@@ -378,7 +381,7 @@ macro_rules! library {
                 match self {
                     $(Self::$name => <$effect as Effect>::inverse(p),)+
                     #[cfg(feature = "written")]
-                    Self::Written(_) => Inverse::Unread,
+                    Self::WrittenFirst(_) | Self::Written(_) => Inverse::Unread,
                 }
             }
         }
@@ -395,7 +398,7 @@ impl EffectId {
     #[inline]
     pub const fn in_library(self) -> bool {
         #[cfg(feature = "written")]
-        if let Self::Written(_) = self {
+        if let Self::WrittenFirst(_) | Self::Written(_) = self {
             return false;
         }
         true

@@ -24,7 +24,7 @@ const MOST_PATHS: usize = 64;
 pub fn export(id: EffectId) -> Result<EffectText, Refusal> {
     let d = id.description();
     let refuse = |why: &str| Err(Refusal::new(d.id, why, "an effect that is a map of bounded length"));
-    if let EffectId::Written(written) = id {
+    if let EffectId::WrittenFirst(written) | EffectId::Written(written) = id {
         return EffectText::parse(written.text, d.source);
     }
     SHEET.with_borrow_mut(|sheet| *sheet = Sheet::default());
@@ -58,6 +58,7 @@ pub fn export(id: EffectId) -> Result<EffectText, Refusal> {
         id: d.id.into(),
         summary: d.title.into(),
         stage,
+        first: id.acts_on_angle(),
         onsets: d.onsets.to_vec(),
         parameter,
         map,

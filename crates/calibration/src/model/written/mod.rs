@@ -62,6 +62,9 @@ pub struct EffectText {
     pub summary: String,
     /// input, mechanics, actuation or readout
     pub stage: String,
+    /// a readout effect acts on the vibration itself, before all of the library's; after them where this is not said
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub first: bool,
     /// values of the first parameter at which a fit begins where the effect has no slope at its neutral values, in units of
     /// one over the amplitude
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -194,7 +197,8 @@ impl EffectText {
         if EffectId::from_id(&self.id).is_some() {
             return refuse(format!("`{}` is an effect of the library", self.id), "an id of its own");
         }
-        let effect = EffectId::Written(admitted(self, compiled, source));
+        let kept = admitted(self, compiled, source);
+        let effect = if self.first { EffectId::WrittenFirst(kept) } else { EffectId::Written(kept) };
         if let Some(problem) = self.unfit(effect) {
             return refuse(problem, "a map that is none at the neutral values, and terms that are linear");
         }
@@ -246,6 +250,9 @@ impl EffectText {
         let stage = STAGES.iter().find(|(name, _)| *name == self.stage).map(|(_, stage)| *stage).ok_or_else(|| {
             format!("stage `{}` is none of input, mechanics, actuation, readout", shortened(&self.stage))
         })?;
+        if self.first && stage != Stage::Readout {
+            return Err("first is of readout effects".into());
+        }
         if self.parameter.len() > MAX_PARAMETERS {
             return Err(format!("more than {MAX_PARAMETERS} parameters"));
         }

@@ -241,5 +241,9 @@ fn one_text_is_one_effect_however_often_it_is_read() {
     assert!(!a.in_library() && EffectId::DetectionCubic.in_library());
     assert_ne!(a, admit("readout", "\"x'\" = \"x + 2 * k\"").unwrap());
     assert!(EffectId::ALL.iter().all(|library| *library < a), "an effect as text acts after all of the library's");
+    let first = file("readout", "\"x'\" = \"x + k\"").replacen('\n', "\nfirst = true\n", 1);
+    let first = EffectText::parse(&first, "first").unwrap().effect("first").unwrap();
+    assert!(EffectId::ALL.iter().all(|library| first < *library) && first.acts_on_angle());
+    assert!(!first.in_library() && !a.acts_on_angle());
     assert_eq!(a.description().parameters.len().min(MAX_PARAMETERS), 1);
 }
