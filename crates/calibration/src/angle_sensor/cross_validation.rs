@@ -1,6 +1,6 @@
 //! Blocked cross-validation within the data to fit: what predicts rows that it has not seen. Blocks are contiguous, so
 //! that neighbours of a row do not betray it (Burman, Chow and Nolan 1994; Roberts et al. 2017), and the simplest model
-//! within one standard error of the best is taken, the errors paired over blocks (Breiman et al. 1984).
+//! within a standard error of the best, or half of one, is taken, the errors paired over blocks (Breiman et al. 1984).
 
 use super::readout::Readout;
 use super::samples::SensorRun;
@@ -15,8 +15,27 @@ const PERIODS_OF_RUNS: f64 = 0.9;
 const PERIODS_OF_ONE: f64 = 1.75;
 /// Whole runs are left out from this many on.
 const FEWEST_RUNS: usize = 3;
-/// Standard errors that a simpler model may be worse by.
-const STANDARD_ERRORS: f64 = 1.0;
+/// Standard errors that one more line has to gain.
+const BETTER: f64 = 1.0;
+
+/// Standard errors that a simpler model may be worse by than the best.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Tolerance {
+    /// half of the usual one, an engineering choice for interleaved blocks: those of a few dozen stations are single rows,
+    /// their standard error is wide, and a whole one leaves a fifth more error than needed
+    Half,
+    /// one (Breiman et al. 1984)
+    One,
+}
+
+impl Tolerance {
+    fn standard_errors(self) -> f64 {
+        match self {
+            Self::Half => 0.5,
+            Self::One => 1.0,
+        }
+    }
+}
 
 /// Which rows are left out together, and which are judged together.
 #[derive(Debug, Clone)]
@@ -73,6 +92,12 @@ impl Folds {
         Self { fold, block, count, blocks, about_mean: false }
     }
 
+    /// What a simpler model may be worse by: less where blocks are interleaved, and then as much as elsewhere if what is
+    /// chosen so does not stand.
+    pub(crate) fn tolerances(&self) -> &'static [Tolerance] {
+        if self.about_mean { &[Tolerance::One] } else { &[Tolerance::Half, Tolerance::One] }
+    }
+
     /// The runs without the rows of a fold.
     pub(crate) fn without(&self, runs: &[SensorRun], fold: usize) -> Vec<SensorRun> {
         let mut first = 0;
@@ -112,16 +137,16 @@ impl Losses {
         (total, (n * variance).sqrt())
     }
 
-    /// No worse than `other` by more than the standard errors allowed.
-    pub(crate) fn is_as_good_as(&self, other: &Self) -> bool {
+    /// No worse than `other` by more than is tolerated.
+    fn is_as_good_as(&self, other: &Self, tolerance: Tolerance) -> bool {
         let (excess, error) = self.excess_over(other);
-        excess <= STANDARD_ERRORS * error
+        excess <= tolerance.standard_errors() * error
     }
 
     /// Better than `other` by more than the standard errors asked for.
     pub(crate) fn is_better_than(&self, other: &Self) -> bool {
         let (excess, error) = other.excess_over(self);
-        excess > STANDARD_ERRORS * error
+        excess > BETTER * error
     }
 }
 
@@ -194,18 +219,18 @@ pub(crate) struct Candidate<M> {
 /// The simplest candidate that is as good as the best. A readout is also seen in the radius: of candidates that predict the
 /// angle alike, those remain that predict the radius as well as the best of them. Ties of size go to the smaller loss, and
 /// ties of that to the order of the models: the order in which they were tried has no say.
-pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>]) -> Option<&Candidate<M>> {
+pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) -> Option<&Candidate<M>> {
     let by_loss = |a: &&Candidate<M>, b: &&Candidate<M>| {
         a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
     };
     let best = candidates.iter().min_by(by_loss)?;
-    let by_angle: Vec<_> = candidates.iter().filter(|c| c.losses.is_as_good_as(&best.losses)).collect();
+    let by_angle: Vec<_> = candidates.iter().filter(|c| c.losses.is_as_good_as(&best.losses, tolerance)).collect();
     let radii = by_angle.iter().filter_map(|c| c.of_radius.as_ref());
     let roundest = radii.min_by(|a, b| a.total().total_cmp(&b.total()));
     by_angle
         .iter()
         .copied()
-        .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best)))
+        .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best, tolerance)))
         .min_by(|a, b| a.size.cmp(&b.size).then_with(|| by_loss(a, b)))
 }
 
@@ -232,7 +257,7 @@ mod tests {
                 candidates.reverse();
             }
             // as good as the best within a standard error, the simplest, and of two alike the first by name
-            assert_eq!(choose(&candidates).map(|c| c.model), Some("lag"));
+            assert_eq!(choose(&candidates, Tolerance::One).map(|c| c.model), Some("lag"));
         }
     }
 
@@ -247,12 +272,12 @@ mod tests {
         for (c, radius) in candidates.iter_mut().zip([9.0, 4.0, 1.1, 1.1]) {
             c.of_radius = Some(Losses { sum: vec![radius, radius * 1.1, radius * 0.9, radius], rows: 4 });
         }
-        assert_eq!(choose(&candidates).map(|c| c.model), Some("affine"));
+        assert_eq!(choose(&candidates, Tolerance::One).map(|c| c.model), Some("affine"));
     }
 
     #[test]
     fn a_model_is_not_simplified_beyond_one_standard_error() {
         let better = [candidate(0, "nothing", [1.2, 1.3, 1.25, 1.22]), candidate(2, "offset", [1.0, 1.1, 1.04, 1.03])];
-        assert_eq!(choose(&better).map(|c| c.model), Some("offset"));
+        assert_eq!(choose(&better, Tolerance::One).map(|c| c.model), Some("offset"));
     }
 }

@@ -5,7 +5,7 @@ use cvg_model::effects::{EffectId, harmonic_n};
 
 use super::model::{Outcome, SensorModel};
 use super::readout::{Kind, Readout};
-use super::readout_fit::fit;
+use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
 use super::table_fit::Motion;
 use super::table_fit::TableFit;
@@ -93,9 +93,10 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
     let of = |value: &dyn Fn(&Refit) -> f64| jackknife(&fits.iter().map(value).collect::<Vec<_>>());
     let readout = |i: usize| of(&|f| f.0.map_or(0.0, |r| r.values()[i]));
     let order = model.table.table.cos.len();
-    let other = noise_model_difference(model, runs);
+    let others = [noise_model_difference(model, runs), weighting_difference(model, runs), held_by_table(model)];
+    let beyond = |i: usize| others.iter().fold(0.0, |sum: f64, other| sum.hypot(other[i])) / STUDENT_19;
     Deviations {
-        readout: std::array::from_fn(|i| readout(i).hypot(other[i] / STUDENT_19)),
+        readout: std::array::from_fn(|i| readout(i).hypot(beyond(i))),
         side: (0..model.table.side.len()).map(|i| of(&|f| f.1.side[i])).collect(),
         cos: (0..order).map(|i| of(&|f| f.1.table.cos[i])).collect(),
         sin: (0..order).map(|i| of(&|f| f.1.table.sin[i])).collect(),
@@ -107,6 +108,35 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
 /// draw the two differ by more than either scatters, and no block tells which is right (Hausman 1978).
 fn noise_model_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
     model.front().filter(|_| model.by_radius).map_or([0.0; 6], |readout| other_noise(readout, runs))
+}
+
+/// By what the readout would differ if angle and radius counted by their own variances, where another weighting was
+/// selected. Both estimate the same where the model is right; where it is not, they differ by more than either scatters
+/// (Hausman 1978).
+fn weighting_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
+    let Some((ours, weighting)) = &model.readout else { return [0.0; 6] };
+    if model.by_radius || ours.kind == Kind::Plain || *weighting == Weighting::VarianceComponents {
+        return [0.0; 6];
+    }
+    let theirs = fit(ours.kind, Weighting::VarianceComponents, runs, model.sensor.gain, ours);
+    let [ours, theirs] = [Some(ours), theirs.as_ref().map(|f| &f.readout)]
+        .map(|r| r.map_or([f64::INFINITY; 6], |r| LibraryReadout::from(r).values()));
+    std::array::from_fn(|i| ours[i] - theirs[i])
+}
+
+/// What a table beside the readout may hold of its parameters: offsets make a harmonic 1 of the angle, gain and skew a
+/// harmonic 2, cubics a harmonic 4 (and, of the channels' difference, a 2).
+fn held_by_table(model: &SensorModel) -> [f64; 6] {
+    let Some(readout) = model.front().filter(|r| r.kind != Kind::Plain) else { return [0.0; 6] };
+    let table = &model.table.table;
+    let harmonic = |n: usize| {
+        let [cos, sin] = [&table.cos, &table.sin].map(|v| v.get(n - 1).copied().unwrap_or(0.0));
+        cos.hypot(sin)
+    };
+    let LibraryReadout { gain_ratio, amplitude, .. } = LibraryReadout::from(readout);
+    let [first, second, fourth] = [1, 2, 4].map(harmonic);
+    let cubic = |harmonic: f64| 16.0 / 3.0 * harmonic / amplitude.powi(2);
+    [first * amplitude, first * amplitude, 2.0 * gain_ratio * second, 2.0 * second, cubic(fourth), cubic(second)]
 }
 
 /// [`noise_model_difference`] of a readout that is known from its radius alone.

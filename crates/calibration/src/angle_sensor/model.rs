@@ -1,6 +1,6 @@
 //! The identified sensor: what was selected, fitted to all rows, with the checks that decide whether it is an answer.
 
-use super::cross_validation::{Candidate, Folds, Losses, choose, losses_of_radius};
+use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, centre, fit};
@@ -64,11 +64,13 @@ impl SensorModel {
                 "more stations, or a longer recording",
             )
         };
-        let selected = selected.ok_or_else(refusal)?;
         let rows: usize = runs.iter().map(SensorRun::len).sum();
         let stride = (rows / ENOUGH_ROWS).max(1);
         let thinned: Vec<SensorRun> = runs.iter().map(|r| r.thinned(stride)).collect();
-        Self::fitted(sensor, &selected, &thinned, rails, &starts).ok_or_else(refusal)
+        let models: Vec<Self> =
+            selected.iter().filter_map(|s| Self::fitted(sensor, s, &thinned, rails, &starts)).collect();
+        let answered = models.iter().find(|m| m.outcome == Outcome::Answered);
+        answered.or(models.first()).cloned().ok_or_else(refusal)
     }
 
     fn fitted(
@@ -139,7 +141,8 @@ impl SensorModel {
                 Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
             })
             .collect();
-        let chosen = choose(&candidates).ok_or_else(|| refuse("no ellipse fits the channels".into()))?;
+        let chosen =
+            choose(&candidates, Tolerance::One).ok_or_else(|| refuse("no ellipse fits the channels".into()))?;
         if chosen.losses.rms() > LARGEST_RADIUS_ERROR {
             return Err(refuse(format!("the best ellipse leaves {:.2} of the radius", chosen.losses.rms())));
         }

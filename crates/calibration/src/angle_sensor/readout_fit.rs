@@ -31,6 +31,19 @@ impl Weighting {
     }
 }
 
+impl Kind {
+    /// Whether what is weighted so tells all parameters of this kind apart. To first order both angle and radius hold
+    /// ½ ln g and (κ_x − κ_y)/8 in their harmonic 2, as a sum in the one and as a difference in the other: each alone leaves
+    /// the gain and cubics of the channels confounded, and the radius any cubic.
+    pub(crate) fn is_told_by(self, weighting: Weighting) -> bool {
+        match weighting {
+            Weighting::Equal | Weighting::VarianceComponents => true,
+            Weighting::Angle => self < Self::CubicPerChannel,
+            Weighting::Radius => self < Self::Cubic,
+        }
+    }
+}
+
 /// Rounds of reweighting of [`Weighting::VarianceComponents`].
 const REWEIGHTINGS: usize = 4;
 /// A weight does not go below this.

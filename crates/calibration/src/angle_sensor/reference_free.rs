@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::cross_validation::{Candidate, Folds, choose, losses_of_radius};
+use super::cross_validation::{Candidate, Folds, Tolerance, choose, losses_of_radius};
 use super::effects::{LibraryReadout, clip, jackknife, other_noise, readout_effects, readout_members, without_block};
 use super::ellipse;
 use super::rails::Rails;
@@ -191,7 +191,7 @@ fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64
             Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
         })
         .collect();
-    let chosen = choose(&candidates).ok_or_else(no_ellipse)?;
+    let chosen = choose(&candidates, Tolerance::One).ok_or_else(no_ellipse)?;
     if chosen.losses.rms() > LARGEST_LEFT {
         return Err(refuse(
             format!("the best ellipse leaves {:.2} of the radius", chosen.losses.rms()),

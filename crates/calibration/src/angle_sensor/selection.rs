@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::cross_validation::{Candidate, Folds, Losses, choose, cross_validate, losses_of_radius};
+use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, cross_validate, losses_of_radius};
 use super::ellipse;
 use super::lines::strongest_line;
 use super::rails::Rails;
@@ -81,22 +81,29 @@ impl<'a> Selection<'a> {
         Self { sensor, runs, folds, rails, starts: starts.to_vec(), without: BTreeMap::new() }
     }
 
-    /// Chooses a model; `None` where there is not even one to compare.
-    pub(crate) fn select(&mut self) -> Option<Selected> {
-        let constant = Shape::constant(self.sensor.free_gain);
-        let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
-        let raw = self.offer(&[plain], std::slice::from_ref(&constant)).pop();
+    /// Chooses a model, and after it a simpler one where that is as good within a wider tolerance; none where there is not
+    /// even one to compare.
+    pub(crate) fn select(&mut self) -> Vec<Selected> {
         let mut pool = Vec::new();
-        let fronts = if self.channels() { self.readouts(&mut pool)? } else { vec![None] };
-        let motions = self.motions(fronts[0]);
+        let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
+        let fronts = if self.channels() { self.readouts(&mut pool) } else { vec![None] };
+        let Some(first) = fronts.first() else { return Vec::new() };
+        let motions = self.motions(*first);
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
-        let mut chosen = choose(&pool)?.clone();
+        let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(|t| choose(&pool, *t).cloned()).collect();
+        chosen.dedup_by(|simpler, first| simpler.model == first.model);
+        chosen.into_iter().map(|c| self.with_lines(c, plain)).collect()
+    }
+
+    /// A model with the isolated lines that it leaves.
+    fn with_lines(&mut self, mut chosen: Candidate<Model>, plain: Option<Front>) -> Selected {
         for _ in 0..MOST_LINES {
             let Some(better) = self.with_a_line(&chosen) else { break };
             chosen = better;
         }
-        let readout_alone = self.offer(&[chosen.model.0], &[constant]).pop().map(|c| c.losses);
-        Some(Selected { model: chosen.model, losses: chosen.losses, readout_alone, raw: raw.map(|c| c.losses) })
+        let constant = Shape::constant(self.sensor.free_gain);
+        let mut alone = |front| self.offer(&[front], std::slice::from_ref(&constant)).pop().map(|c| c.losses);
+        Selected { readout_alone: alone(chosen.model.0), raw: alone(plain), model: chosen.model, losses: chosen.losses }
     }
 
     fn channels(&self) -> bool {
@@ -105,11 +112,12 @@ impl<'a> Selection<'a> {
 
     /// Every readout with every weighting, without a table and beside one; the best few kinds remain, each with the
     /// weighting that predicts best.
-    fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Option<Vec<Option<Front>>> {
+    fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Vec<Option<Front>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
         let mut fronts = vec![Some((Kind::Plain, Weighting::Equal))];
         if !self.starts.is_empty() {
-            fronts.extend(Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| Some((*k, w)))));
+            let all = Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| (*k, w)));
+            fronts.extend(all.filter(|(kind, weighting)| kind.is_told_by(*weighting)).map(Some));
         }
         let first = self.offer(&fronts, &coarse);
         let mut best: BTreeMap<Option<Kind>, (f64, Option<Front>)> = BTreeMap::new();
@@ -123,7 +131,7 @@ impl<'a> Selection<'a> {
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
         let finalists: Vec<_> = ranked.into_iter().take(FINALISTS).map(|(_, f)| f).collect();
         pool.extend(first.into_iter().filter(|c| !finalists.contains(&c.model.0)));
-        (!finalists.is_empty()).then_some(finalists)
+        finalists
     }
 
     /// How the angle follows motion is settled once.
@@ -144,7 +152,7 @@ impl<'a> Selection<'a> {
             all.extend([Motion::Rate, Motion::RateAndAcceleration]);
         }
         let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));
-        match choose(&trial).map(|c| c.model.1.motion) {
+        match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
             Some(motion) => vec![Motion::None, motion],
         }
@@ -233,7 +241,7 @@ impl<'a> Selection<'a> {
         orders.dedup();
         let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
         let more = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
-        let better = choose(&more)?;
+        let better = choose(&more, Tolerance::One)?;
         better.losses.is_better_than(&chosen.losses).then(|| better.clone())
     }
 }
