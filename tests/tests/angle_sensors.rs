@@ -258,6 +258,53 @@ fn the_bias_of_a_rate_gyroscope_that_hardly_turns_is_told_all_the_same() {
     assert!(held_out(&i) < 0.25 * i.report.heldout.raw.unwrap().rms_deg, "{:?}", i.report.heldout);
 }
 
+#[test]
+fn a_rate_gyroscope_in_radians_is_refused_and_the_unit_is_named() {
+    let as_read = |theta: fn(f64) -> f64, table: fn(f64) -> f64| {
+        let mut run = rate_gyroscope(3);
+        let converted =
+            |column: &Option<Vec<f64>>, f: fn(f64) -> f64| column.as_ref().map(|v| v.iter().map(|d| f(*d)).collect());
+        run.recording.theta_deg = converted(&run.recording.theta_deg, theta);
+        run.recording.table_deg = converted(&run.recording.table_deg, table);
+        let campaign = Campaign { instrument: Instrument::Gyroscope, ..sensor(vec![run]) };
+        identify(campaign, &Options::default()).map_err(|refusal| refusal.to_string())
+    };
+    let same = |d: f64| d;
+    assert!(as_read(same, same).is_ok());
+    for (theta, table, column) in
+        [(f64::to_radians as fn(f64) -> f64, same as fn(f64) -> f64, "theta_deg"), (same, f64::to_radians, "table_deg")]
+    {
+        let refusal = as_read(theta, table).map(|i| i.report.angular_gain).unwrap_err();
+        assert!(refusal.contains(column) && refusal.contains("radians"), "{refusal}");
+    }
+}
+
+#[test]
+fn channels_that_do_not_follow_the_reference_are_not_an_answer() {
+    let mut answered = Vec::new();
+    for seed in 0..12 {
+        let noise = |seed| {
+            let mut noise = Noise::new(seed);
+            let mut column = || (0..36).map(|_| noise.sample()).collect::<Vec<_>>();
+            let (x, y) = (column(), column());
+            Recording {
+                t_s: (0..36).map(f64::from).collect(),
+                table_deg: Some((0..36).map(|i| f64::from(i) * 10.0).collect()),
+                xc_v: Some(x),
+                yc_v: Some(y),
+                ..Recording::default()
+            }
+        };
+        let runs = vec![run("a.csv", Role::Fit, noise(seed)), run("b.csv", Role::Holdout, noise(seed + 100))];
+        if let Ok(i) = identify(sensor(runs), &Options::default())
+            && i.report.status == Status::Answered
+        {
+            answered.push((seed, i.report.heldout));
+        }
+    }
+    assert!(answered.is_empty(), "{answered:#?}");
+}
+
 /// Slow noise and nothing else.
 fn remembered(seed: u64, memory: f64, turns: f64) -> Run {
     let mut noise = Noise::new(seed);

@@ -1,7 +1,8 @@
 //! The main job for angle sensors and rate gyroscopes: runs made ready, a model selected and fitted, the held-out rows read
 //! once at the end, and a report of it all.
 
-use super::effects::{Described, deviations};
+use super::deviations::deviations;
+use super::effects::Described;
 use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, Term};
 use super::report::{Errors, Finding, Head, report};
@@ -157,6 +158,24 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
     })
 }
 
+/// Share of its scale factor by which a rate gyroscope may be off: engineering choice, far beyond any device's.
+const LARGEST_SCALE_ERROR: f64 = 0.3;
+
+/// Refuses a scale factor, as a share of the one stated, that no gyroscope has; an angle in radians is named.
+fn plausible(scale: f64) -> Result<(), Refusal> {
+    if (scale - 1.0).abs() <= LARGEST_SCALE_ERROR {
+        return Ok(());
+    }
+    let wanted = if (scale.to_degrees() - 1.0).abs() < LARGEST_SCALE_ERROR {
+        "theta_deg in degrees: it looks like radians"
+    } else if (scale.to_radians() - 1.0).abs() < LARGEST_SCALE_ERROR {
+        "table_deg or rate_dps in degrees: it looks like radians"
+    } else {
+        "an angle and a reference of the same axis, in degrees"
+    };
+    Err(Refusal::no_answer("campaign", format!("the output follows {scale:.4} of the reference's angle"), wanted))
+}
+
 fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
     let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
         Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
@@ -164,6 +183,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
     let (gain, deviation) = model.gain;
     let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
+    plausible((gain / model.sensor.gain).abs())?;
     let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
     neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
     let mut hypothesis =

@@ -5,7 +5,8 @@
 use std::f64::consts::TAU;
 
 use super::cross_validation::{Candidate, Folds, Tolerance, choose, losses_of_radius};
-use super::effects::{LibraryReadout, clip, jackknife, other_noise, readout_effects, readout_members, without_block};
+use super::deviations::{jackknife, other_noise, without_block};
+use super::effects::{LibraryReadout, clip, readout_effects, readout_members};
 use super::ellipse;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
