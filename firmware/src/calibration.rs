@@ -98,7 +98,7 @@ impl<T: Float> Life<T> {
         let second = self.step / PER_S;
         let turned = match second {
             85..95 => T::one(),
-            110.. => T::ratio(1 + (second / 3 % 5) as i32, if second / 3 % 2 == 0 { 1 } else { -1 }),
+            110.. => T::ratio(1 + (second / 3 % 5) as i32, if (second / 3).is_multiple_of(2) { 1 } else { -1 }),
             _ => T::zero(),
         };
         let health = if matches!(second, 1 | 170) { Health::Disturbed } else { Health::Operating };
@@ -144,7 +144,7 @@ impl<T: Float> Life<T> {
         }
         self.turn(&drives, rate, ahead, dt);
         self.step += 1;
-        if self.step % PER_S == 0 {
+        if self.step.is_multiple_of(PER_S) {
             self.check_status();
         }
     }
