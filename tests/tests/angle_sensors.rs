@@ -275,7 +275,7 @@ fn a_rate_gyroscope_in_radians_is_refused_and_the_unit_is_named() {
         [(f64::to_radians as fn(f64) -> f64, same as fn(f64) -> f64, "theta_deg"), (same, f64::to_radians, "table_deg")]
     {
         let refusal = as_read(theta, table).map(|i| i.report.angular_gain).unwrap_err();
-        assert!(refusal.contains(column) && refusal.contains("radians"), "{refusal}");
+        assert!(refusal.contains(column) && refusal.contains("in rad"), "{refusal}");
     }
 }
 

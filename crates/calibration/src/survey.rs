@@ -6,7 +6,7 @@ use crate::angle_sensor::reference_free::{self, Curve};
 use crate::diagnostics::at_rest;
 use crate::error::Refusal;
 use crate::identification::{Identification, Options, identify_with_plots, run_report};
-use crate::recording::{Campaign, Instrument, Run};
+use crate::recording::{Campaign, Run};
 use crate::report::calibration::Calibration;
 use crate::report::survey::Survey;
 use crate::report::{Allan, Estimate, RunReport, provenance};
@@ -83,10 +83,7 @@ fn survey(
     inputs: Vec<crate::report::Input>,
     options: &Options<'_>,
 ) -> Result<Answer, Refusal> {
-    let instrument = match campaign.instrument {
-        Instrument::Gyroscope => "gyroscope",
-        Instrument::Sensor => "sensor",
-    };
+    let instrument = campaign.instrument.name();
     let runs = campaign.runs.iter().map(run_report).collect();
     let mut report = Survey::new(campaign.device.clone(), instrument, inputs, runs);
     report.warnings = campaign.all_warnings().map(str::to_owned).collect();

@@ -14,6 +14,7 @@ use crate::estimation::statistics::median;
 use crate::identification::{Identification, Options};
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::{Campaign, Instrument, RunKind};
+use crate::report::gate::least_held_out;
 use crate::report::{EffectReport, Estimate, ParameterReport, Share};
 use cvg_model::effects::EffectId;
 
@@ -48,6 +49,7 @@ const ENOUGH_ROWS: usize = 3000;
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
 pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let rate_gyroscope = is_rate_gyroscope(&campaign);
+    let instrument = campaign.instrument;
     let stated = match campaign.pole_pairs {
         Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
         None => campaign.angular_gain,
@@ -59,7 +61,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     if !rate_gyroscope {
         require_a_turn(&fitted, stated.unwrap_or(1.0))?;
     }
-    if held.iter().map(SensorRun::len).sum::<usize>() < FEWEST_HELD_ROWS {
+    if held.iter().map(SensorRun::len).sum::<usize>() < least_held_out(instrument) {
         return Err(Refusal::no_answer(
             "campaign",
             "too few rows are left to test an answer on",
@@ -70,11 +72,8 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let finding =
         if rate_gyroscope { rate_finding(stated, period, &fitted)? } else { sensor_finding(stated, period, &fitted)? };
     (options.progress)("measuring the held-out error");
-    Ok(report(head, finding, &fitted, &held, with_plots))
+    report(head, finding, &fitted, &held, with_plots)
 }
-
-/// Held-out rows below which an error says nothing.
-const FEWEST_HELD_ROWS: usize = 4;
 
 fn require_a_turn(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
     let furthest = runs.iter().map(|r| r.travel_rad() * gain.abs()).fold(0.0, f64::max);
@@ -121,7 +120,8 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
     }
     let samples = model.sensor.samples(&thinned, declared.as_ref());
     Ok(Finding {
-        instrument: "sensor",
+        instrument: Instrument::Sensor,
+        stated_gain: stated,
         reason: neutral.then(|| {
             "nothing that was found predicts rows that were not fitted better than the sensor as it is".to_owned()
         }),
@@ -158,24 +158,6 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
     })
 }
 
-/// Share of its scale factor by which a rate gyroscope may be off: engineering choice, far beyond any device's.
-const LARGEST_SCALE_ERROR: f64 = 0.3;
-
-/// Refuses a scale factor, as a share of the one stated, that no gyroscope has; an angle in radians is named.
-fn plausible(scale: f64) -> Result<(), Refusal> {
-    if (scale - 1.0).abs() <= LARGEST_SCALE_ERROR {
-        return Ok(());
-    }
-    let wanted = if (scale.to_degrees() - 1.0).abs() < LARGEST_SCALE_ERROR {
-        "theta_deg in degrees: it looks like radians"
-    } else if (scale.to_radians() - 1.0).abs() < LARGEST_SCALE_ERROR {
-        "table_deg or rate_dps in degrees: it looks like radians"
-    } else {
-        "an angle and a reference of the same axis, in degrees"
-    };
-    Err(Refusal::no_answer("campaign", format!("the output follows {scale:.4} of the reference's angle"), wanted))
-}
-
 fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
     let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
         Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
@@ -183,7 +165,6 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
     let (gain, deviation) = model.gain;
     let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
-    plausible((gain / model.sensor.gain).abs())?;
     let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
     neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
     let mut hypothesis =
@@ -208,7 +189,8 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
-        instrument: "gyroscope",
+        instrument: Instrument::Gyroscope,
+        stated_gain: Some(stated.unwrap_or(1.0)),
         reason: (!model.answered).then(|| {
             "bias, scale factor and lag do not predict parts of the runs that were left out better than nothing".into()
         }),

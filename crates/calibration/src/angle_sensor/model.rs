@@ -25,10 +25,6 @@ pub(crate) enum Outcome {
     Neutral,
 }
 
-/// Error that may be left of rows that were not fitted, rms, rad of the pattern: beyond it the channels do not follow the
-/// reference. Engineering choice; poor magnetometers turned by hand leave 0.2, and chance 1.8.
-const LARGEST_ERROR_RAD: f64 = 0.5;
-
 /// An identified sensor.
 #[derive(Debug, Clone)]
 pub(crate) struct SensorModel {
@@ -74,18 +70,7 @@ impl SensorModel {
         let models: Vec<Self> =
             selected.iter().filter_map(|s| Self::fitted(sensor, s, &thinned, rails, &starts)).collect();
         let answered = models.iter().find(|m| m.outcome == Outcome::Answered);
-        let model = answered.or(models.first()).cloned().ok_or_else(refusal)?;
-        if model.outcome == Outcome::Answered && model.predicted > LARGEST_ERROR_RAD {
-            return Err(Refusal::no_answer(
-                "campaign",
-                format!(
-                    "the sensor does not follow its reference: {:.0}° are left of the best model",
-                    model.predicted.to_degrees()
-                ),
-                "a sensor and a reference that turn together, both recorded at the same time",
-            ));
-        }
-        Ok(model)
+        answered.or(models.first()).cloned().ok_or_else(refusal)
     }
 
     fn fitted(

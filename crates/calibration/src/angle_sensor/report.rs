@@ -7,12 +7,14 @@ use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
+use crate::error::Refusal;
 use crate::estimation::residuals::Residual;
 use crate::estimation::statistics::median;
 use crate::identification::{BiasCurve, Figures, Identification, run_report};
 use crate::model::hypothesis::{Hypothesis, Origin};
-use crate::recording::Campaign;
+use crate::recording::{Campaign, Instrument};
 use crate::report::calibration::{Calibration, Provenance};
+use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::stages::stages;
 use crate::report::{
@@ -25,7 +27,9 @@ pub(crate) type Errors<'a> = Box<dyn Fn(&SensorRun) -> Vec<f64> + 'a>;
 
 /// What an identification found, with the errors that it leaves of any run.
 pub(crate) struct Finding<'a> {
-    pub(crate) instrument: &'static str,
+    pub(crate) instrument: Instrument,
+    /// the angular gain that the campaign states
+    pub(crate) stated_gain: Option<f64>,
     /// why nothing is undone, where nothing is
     pub(crate) reason: Option<String>,
     pub(crate) angular_gain: Estimate,
@@ -76,13 +80,16 @@ const SAME_STATION: f64 = 1e-3;
 const FEWEST_PAIRS: usize = 10;
 
 /// Reads the held-out rows, once, and reports.
+///
+/// # Errors
+/// Where what was found does not pass the gate.
 pub(crate) fn report(
     head: Head,
     finding: Finding<'_>,
     fitted: &[SensorRun],
     held: &[SensorRun],
     with_plots: bool,
-) -> Identification {
+) -> Result<Identification, Refusal> {
     let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
         let segments = runs.iter().map(|r| segment(r, errors(r), &finding)).collect();
         Evaluation::of_segments(segments, like)
@@ -134,7 +141,7 @@ pub(crate) fn report(
         tool: Tool::default(),
         inputs: head.inputs.clone(),
         device: head.device.clone(),
-        instrument: finding.instrument.into(),
+        instrument: finding.instrument.name().into(),
         angular_gain: finding.angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
@@ -168,7 +175,19 @@ pub(crate) fn report(
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: head.amplitude_v };
     let calibration = Calibration { device: head.device, hypothesis, provenance };
-    Identification { report, calibration, figures, steps: Vec::new(), plots }
+    if !neutral {
+        let facts = Facts {
+            instrument: finding.instrument,
+            period_deg: finding.period.to_degrees(),
+            // what hardly turns has a bias, and a gain that nobody can judge
+            tells_gain: gate::gain_is_told(&report.angular_gain),
+            stated: finding.stated_gain,
+            held_out: after.errors().count(),
+            fitted_rms_deg: on_fit.size().rms_deg,
+        };
+        gate::pass(&report, &calibration, facts)?;
+    }
+    Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })
 }
 
 /// A run's errors as the residual diagnostics take them.

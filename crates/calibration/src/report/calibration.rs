@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Parameter};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
@@ -104,10 +104,7 @@ impl Calibration {
         let file = File {
             schema: SCHEMA.into(),
             device: self.device.clone(),
-            instrument: match h.instrument {
-                Instrument::Gyroscope => "gyroscope".into(),
-                Instrument::Sensor => "sensor".into(),
-            },
+            instrument: h.instrument.name().into(),
             period_deg: h.period_rad.to_degrees().round(),
             angular_gain: h.angular_gain,
             follows_input: h.follows_input,
@@ -187,7 +184,7 @@ impl Calibration {
         hypothesis.force_scale = file.force_scale_per_v_s;
         hypothesis.control_latency_s = file.control_latency_s;
         for e in &file.effect {
-            hypothesis.members.push(member(e, name)?);
+            hypothesis.members.push(member(e, instrument, name)?);
         }
         hypothesis.members.sort_by_key(|m| m.id);
         let cycles = std::f64::consts::TAU / hypothesis.period_rad;
@@ -213,7 +210,14 @@ impl Calibration {
     }
 }
 
-fn member(entry: &EffectEntry, name: &str) -> Result<Member, Refusal> {
+/// A value is one that the parameter can have. The library's bounds are of volts; what a sensor's channels are in, millivolts or
+/// the counts of a converter, nobody says.
+fn is_within(parameter: &Parameter, instrument: Instrument, value: f64) -> bool {
+    let any_unit = instrument == Instrument::Sensor && parameter.unit.contains('V');
+    value.is_finite() && (any_unit || (parameter.lower..=parameter.upper).contains(&value))
+}
+
+fn member(entry: &EffectEntry, instrument: Instrument, name: &str) -> Result<Member, Refusal> {
     let id = match &entry.text {
         Some(text) => EffectText::parse(text, name)?.effect(name)?,
         None => EffectId::from_id(&entry.id).ok_or_else(|| {
@@ -231,7 +235,7 @@ fn member(entry: &EffectEntry, name: &str) -> Result<Member, Refusal> {
     let mut values = id.neutral::<f64>();
     for (key, value) in &entry.parameters {
         let at = parameters.iter().position(|p| p.name == key);
-        let sound = at.is_some_and(|i| (parameters[i].lower..=parameters[i].upper).contains(value));
+        let sound = at.is_some_and(|i| is_within(&parameters[i], instrument, *value));
         let (Some(i), true) = (at, sound) else {
             return Err(Refusal::new(
                 name,

@@ -10,8 +10,14 @@ use crate::recording::Instrument;
 use crate::report::calibration::Calibration;
 use crate::report::{Estimate, Report};
 
-/// A held-out error is counted on at least this many samples.
-const LEAST_HELD_OUT: usize = 16;
+/// A held-out error is counted on at least this many samples: the stations of a sensor are measurements of their own.
+pub(crate) fn least_held_out(instrument: Instrument) -> usize {
+    match instrument {
+        Instrument::Gyroscope => 16,
+        Instrument::Sensor => 4,
+    }
+}
+
 /// An error beyond this share of the angle's period is no error of an angle that is followed.
 const LARGEST_ERROR: f64 = 0.1;
 /// The smallest angular gain of a resonator: modes of high order are carried along least.
@@ -42,7 +48,7 @@ pub(crate) struct Facts {
 /// [`Refusal`] without an answer, with what is wrong and what would help.
 pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> Result<(), Refusal> {
     let refuse = |problem: String, wanted: &str| Err(Refusal::no_answer(&report.device, problem, wanted));
-    if facts.held_out < LEAST_HELD_OUT {
+    if facts.held_out < least_held_out(facts.instrument) {
         return refuse(
             format!("only {} samples are left to measure an error on that nothing was fitted to", facts.held_out),
             "a longer run, or one with use = \"holdout\"",
@@ -132,8 +138,15 @@ fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
 
 /// The unit in which rates, angles or times would have to be for a gain to be possible.
 fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
-    const UNITS: [(f64, &str); 6] = [
-        (57.295_78, "rate_dps in deg/s: it looks as if in rad/s (rate_dps = \"…*57.29578\" in [columns], or by --map)"),
+    const UNITS: [(f64, &str); 7] = [
+        (
+            1.0 / 57.295_78,
+            "theta_deg in deg: it looks as if in rad (theta_deg = \"…*57.29578\" in [columns], or by --map)",
+        ),
+        (
+            57.295_78,
+            "rate_dps in deg/s: it looks as if in rad/s (rate_dps = \"…*57.29578\" in [columns], or by --map), or table_deg in rad",
+        ),
         (
             6.0,
             "rate_dps in deg/s: it looks as if in revolutions per minute (rate_dps = \"…*6\" in [columns], or by --map)",

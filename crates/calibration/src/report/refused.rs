@@ -66,10 +66,7 @@ impl About {
             tool: Tool::default(),
             inputs: provenance::sums(&self.files),
             device: self.device,
-            instrument: match self.instrument {
-                Instrument::Gyroscope => "gyroscope",
-                Instrument::Sensor => "sensor",
-            },
+            instrument: self.instrument.name(),
             angular_gain: None,
             detection_gain_ratio: None,
             actuation_gain_ratio: None,

@@ -25,6 +25,16 @@ pub enum Instrument {
     Sensor,
 }
 
+impl Instrument {
+    /// The word for it in campaigns, reports and calibrations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gyroscope => "gyroscope",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
 /// What the reference of a campaign is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
