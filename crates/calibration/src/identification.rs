@@ -1,6 +1,6 @@
 //! The main job: a campaign in, the identified instrument out, with everything a reader needs to check it.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Shown, Stage};
+use cvg_model::effects::EffectId;
 use nalgebra::DMatrix;
 
 use crate::angle_sensor;
@@ -14,23 +14,22 @@ use crate::diagnostics::scale_factor::{gains, scale_factor};
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
-use crate::estimation::identifiability::{confounded_with, separated_by};
-use crate::estimation::joint_fit::{Dataset, Fitted, belief, declared_hypothesis, fit_with_ring_downs};
+use crate::estimation::joint_fit::{Dataset, Fitted, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::free_decay;
-use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
-use crate::recording::{Campaign, Instrument, Reference, Role, RunKind};
+use crate::model::hypothesis::Hypothesis;
+use crate::recording::{Campaign, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
+use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{described, unexplained};
 use crate::report::{
-    BeforeAfter, EffectReport, Estimate, Heldout, ParameterReport, Report, ResidualReport, RunReport, SCHEMA, Status,
-    Tool,
+    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, ScaleFactor, Status, Tool,
 };
 use crate::selection::discovery::{Step, discover};
 use crate::selection::last_step::last_step;
@@ -92,12 +91,6 @@ pub struct BiasCurve {
 
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
-/// Share of its prior's width to which an unknown must narrow to count as told by the data.
-const MIN_CONTRACTION: f64 = 0.1;
-/// Gain ratios known no better than this, as the half width of the interval, are no answer.
-const WIDEST_DETECTION_RATIO: f64 = 0.1;
-const WIDEST_ACTUATION_RATIO: f64 = 0.02;
-
 /// Identifies the instrument of a campaign.
 ///
 /// # Errors
@@ -137,10 +130,12 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
         identified.report.warnings.extend(not_tried(options, "an angle sensor"));
         return Ok(identified);
     }
-    let device = campaign.device.clone();
-    let mut runs: Vec<RunReport> = campaign.runs.iter().map(run_report).collect();
-    let inputs = provenance::sums(&provenance::files(&campaign));
-    let amplitude_v = provenance::amplitudes(&campaign);
+    let head = Head {
+        device: campaign.device.clone(),
+        runs: campaign.runs.iter().map(run_report).collect(),
+        inputs: provenance::sums(&provenance::files(&campaign)),
+        amplitude_v: provenance::amplitudes(&campaign),
+    };
     (options.progress)("preparing the runs");
     let mut dataset = Dataset::new(campaign)?;
     dataset.written.clone_from(&options.effects);
@@ -154,137 +149,199 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
     let scale_factor = scale_factor(&gains(&mut dataset, &fitted));
     (options.progress)("measuring the held-out error");
-    let heldout = |h: &Hypothesis, fit: &Fit, like: Option<&Evaluation>| {
-        evaluate(&dataset.tracks, h, &fit.starts, Role::Holdout, Window::Whole, like)
-    };
-    let after = heldout(&fitted.fit.hypothesis, &fitted.fit, None);
-    let before = heldout(&declared_fit.hypothesis, &declared_fit, Some(&after));
-    let ideal = Hypothesis { members: Vec::new(), force_scale: 0.0, ..fitted.fit.hypothesis.clone() };
-    let raw = heldout(&ideal, &fitted.fit, Some(&after));
+    let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
+    let warnings = std::mem::take(&mut dataset.warnings);
+    let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors };
+    found.report(head, warnings, with_plots)
+}
 
-    let on_fit = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
-    let dense = |role| evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, role, Window::Dense, None);
-    let noise_floor = dense(Role::Holdout).noise_floor();
-    let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
-    let count = on_fit.errors().count();
-    let white = ljung_box(&correlation, count) >= WHITENESS_LEVEL;
+/// What the campaign says of itself, kept while its recordings are taken apart.
+struct Head {
+    device: String,
+    runs: Vec<RunReport>,
+    inputs: Vec<Input>,
+    amplitude_v: Option<[f64; 2]>,
+}
 
-    let declared_on_fit =
-        evaluate(&dataset.tracks, &declared_fit.hypothesis, &declared_fit.starts, Role::Fit, Window::Whole, None);
-    let mut left = channels(&dataset, &declared_fit, "declared", &declared_on_fit);
-    left.extend(channels(&dataset, &fitted.fit, "discovered", &on_fit));
-    let mut warnings = std::mem::take(&mut dataset.warnings);
-    let knowledge = Knowledge { dataset: &dataset, fitted: &fitted, covariance: &covariance };
-    let detection_gain_ratio = knowledge.detection_ratio(&mut warnings);
-    let actuation_gain_ratio = knowledge.actuation_ratio(&mut warnings);
-    let effects = knowledge.effects(&steps, &after);
-    for e in effects.iter().filter(|e| !e.confounded_with.is_empty()) {
-        warnings.push(format!(
-            "{} is confounded with {} in this campaign; {} would separate them",
-            e.id,
-            e.confounded_with.join(", "),
-            e.separated_by.as_deref().unwrap_or("another run")
-        ));
+/// What is left of the angle, at every stage: of the held-out samples, and of the fitted ones.
+struct Errors {
+    /// with nothing undone, and what that is
+    raw: Evaluation,
+    ideal: Hypothesis,
+    declared: Evaluation,
+    discovered: Evaluation,
+    declared_on_fit: Evaluation,
+    on_fit: Evaluation,
+    /// of short windows, where nothing slow shows
+    dense_on_fit: Evaluation,
+    noise_floor: f64,
+}
+
+impl Errors {
+    fn of(dataset: &Dataset, declared: &Fit, found: &Fit) -> Self {
+        let left = |h: &Hypothesis, fit: &Fit, role, window, like: Option<&Evaluation>| {
+            evaluate(&dataset.tracks, h, &fit.starts, role, window, like)
+        };
+        let heldout = |h: &Hypothesis, fit: &Fit, like| left(h, fit, Role::Holdout, Window::Whole, like);
+        let ideal = Hypothesis { members: Vec::new(), force_scale: 0.0, ..found.hypothesis.clone() };
+        let discovered = heldout(&found.hypothesis, found, None);
+        Self {
+            raw: heldout(&ideal, found, Some(&discovered)),
+            ideal,
+            declared: heldout(&declared.hypothesis, declared, Some(&discovered)),
+            declared_on_fit: left(&declared.hypothesis, declared, Role::Fit, Window::Whole, None),
+            on_fit: left(&found.hypothesis, found, Role::Fit, Window::Whole, None),
+            dense_on_fit: left(&found.hypothesis, found, Role::Fit, Window::Dense, None),
+            noise_floor: left(&found.hypothesis, found, Role::Holdout, Window::Dense, None).noise_floor(),
+            discovered,
+        }
     }
-    let plots = with_plots.then(|| {
-        let members = &fitted.fit.hypothesis.members;
-        let told: Vec<usize> = (0..members.len()).filter(|&at| knowledge.identifiable(at, &members[at])).collect();
-        let scene = PlotContext {
-            dataset: &dataset,
-            fit: &fitted.fit,
-            covariance: &covariance,
-            raw: Some(&raw),
-            declared: &before,
-            discovered: &after,
-            on_fit: &on_fit,
+
+    fn heldout(&self) -> Heldout {
+        Heldout {
+            raw: Some(self.raw.size()),
+            declared: self.declared.size(),
+            discovered: self.discovered.size(),
+            noise_floor_deg: self.noise_floor.to_degrees(),
+        }
+    }
+
+    fn residual(&self) -> ResidualReport {
+        let correlation = autocorrelation(&self.on_fit, WHITENESS_LAGS);
+        let harmonics = |of| reported_harmonics(&self.discovered, of, &self.discovered);
+        ResidualReport {
+            harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
+            white: ljung_box(&correlation, self.on_fit.errors().count()) >= WHITENESS_LEVEL,
+        }
+    }
+}
+
+/// An identified campaign, before it is told.
+struct Found {
+    dataset: Dataset,
+    declared_fit: Fit,
+    fitted: Fitted,
+    covariance: DMatrix<f64>,
+    steps: Vec<Step>,
+    scale_factor: Option<ScaleFactor>,
+    errors: Errors,
+}
+
+impl Found {
+    fn report(self, head: Head, mut warnings: Vec<String>, with_plots: bool) -> Result<Identification, Refusal> {
+        let Self { dataset, fitted, errors, .. } = &self;
+        let mut channels_left = channels(dataset, &self.declared_fit, "declared", &errors.declared_on_fit);
+        channels_left.extend(channels(dataset, &fitted.fit, "discovered", &errors.on_fit));
+        let inference = Inference { dataset, fitted, covariance: &self.covariance };
+        let detection_gain_ratio = inference.detection_ratio(&mut warnings);
+        let actuation_gain_ratio = inference.actuation_ratio(&mut warnings);
+        let effects = inference.effects(&self.steps, &errors.discovered);
+        warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
+        let angular_gain = inference.angular_gain();
+        let plots = with_plots.then(|| self.plots(&inference));
+        let left = unexplained(dataset, &errors.on_fit, &errors.dense_on_fit, &errors.discovered, errors.noise_floor);
+        let proposals = proposals(dataset, &fitted.fit, &errors.on_fit, &channels_left, &left);
+        let mut unexplained = described(&fitted.fit.hypothesis, &self.steps);
+        unexplained.extend(left);
+        let facts = Facts {
+            instrument: dataset.instrument,
+            period_deg: dataset.start.period_rad.to_degrees(),
+            tells_gain: true,
+            stated: dataset.screen.stated(),
+            held_out: errors.discovered.errors().count(),
+            fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
+        };
+        let runs = self.runs(head.runs, &mut warnings);
+        let mut report = Report {
+            schema: SCHEMA.into(),
+            status: Status::Answered,
+            reason: None,
+            tool: Tool::default(),
+            inputs: head.inputs,
+            device: head.device,
+            instrument: self.dataset.instrument.name().into(),
+            angular_gain,
+            detection_gain_ratio,
+            actuation_gain_ratio,
+            effects,
+            heldout: self.errors.heldout(),
+            steps: stages(Some(&self.errors.raw), &self.errors.declared, &self.errors.discovered, &self.steps),
+            residual: self.errors.residual(),
+            channels: channels_left,
+            unexplained,
+            runs,
+            decomposition: Vec::new(),
+            proposals,
+            scale_factor: self.scale_factor.clone(),
+            allan: None,
+            decay: None,
+            warnings,
+        };
+        let provenance =
+            Provenance { tool: Some(Tool::default()), inputs: report.inputs.clone(), amplitude_v: head.amplitude_v };
+        let hypothesis = self.fitted.fit.hypothesis.clone();
+        let mut calibration = Calibration { device: report.device.clone(), hypothesis, provenance };
+        gate::pass(&report, &calibration, facts)?;
+        if let Some(reason) = no_better(&report.heldout, facts.held_out) {
+            (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
+            report.warnings.insert(0, reason);
+            calibration.hypothesis = self.errors.ideal.clone();
+        }
+        let Self { dataset, fitted, steps, errors, .. } = self;
+        let figures = figures(&dataset, Some(&errors.raw), &errors.declared, &errors.discovered, fitted.ring_downs);
+        Ok(Identification { report, figures, calibration, steps, plots })
+    }
+
+    fn plots(&self, inference: &Inference<'_>) -> PlotData {
+        let members = &self.fitted.fit.hypothesis.members;
+        let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
+        PlotContext {
+            dataset: &self.dataset,
+            fit: &self.fitted.fit,
+            covariance: &self.covariance,
+            raw: Some(&self.errors.raw),
+            declared: &self.errors.declared,
+            discovered: &self.errors.discovered,
+            on_fit: &self.errors.on_fit,
             members: &told,
-        };
-        scene.plots()
-    });
-    let spikes: Vec<usize> =
-        fitted.fit.set_aside.iter().enumerate().map(|(track, fit)| fit + after.spikes_of(track)).collect();
-    let all_spikes: usize = spikes.iter().sum();
-    if all_spikes > 0 {
-        warnings.push(format!("{all_spikes} samples were set aside as spikes"));
+        }
+        .plots()
     }
-    warnings.extend(tell_apart(&mut runs, &dataset, &fitted.fit, (&on_fit, &after)));
-    for ((run, t), spikes) in dataset.screen.of(&mut runs).into_iter().zip(&dataset.tracks).zip(spikes) {
-        run.spikes = spikes;
-        run.rate_dps = Some(t.track.mean_rate().to_degrees());
-        run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
-            (true, true) => "fit, last quarter held out".into(),
-            (true, false) => "fit".into(),
-            _ => "holdout".into(),
-        };
+
+    /// What each run tells by itself, and how it was used.
+    fn runs(&self, mut runs: Vec<RunReport>, warnings: &mut Vec<String>) -> Vec<RunReport> {
+        let (fit, after) = (&self.fitted.fit, &self.errors.discovered);
+        let spikes: Vec<usize> =
+            fit.set_aside.iter().enumerate().map(|(track, fit)| fit + after.spikes_of(track)).collect();
+        let all_spikes: usize = spikes.iter().sum();
+        if all_spikes > 0 {
+            warnings.push(format!("{all_spikes} samples were set aside as spikes"));
+        }
+        warnings.extend(tell_apart(&mut runs, &self.dataset, fit, (&self.errors.on_fit, after)));
+        for ((run, t), spikes) in self.dataset.screen.of(&mut runs).into_iter().zip(&self.dataset.tracks).zip(spikes) {
+            run.spikes = spikes;
+            run.rate_dps = Some(t.track.mean_rate().to_degrees());
+            run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {
+                (true, true) => "fit, last quarter held out".into(),
+                (true, false) => "fit".into(),
+                _ => "holdout".into(),
+            };
+        }
+        for (run, r) in runs.iter_mut().filter(|r| r.kind == "ringdown").zip(&self.fitted.ring_downs) {
+            run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
+        }
+        runs
     }
-    for (run, r) in runs.iter_mut().filter(|r| r.kind == "ringdown").zip(&fitted.ring_downs) {
-        run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
-    }
-    let mut unexplained = unexplained(&dataset, &on_fit, &dense(Role::Fit), &after, noise_floor);
-    let proposals = proposals(&dataset, &fitted.fit, &on_fit, &left, &unexplained);
-    unexplained.splice(0..0, described(&fitted.fit.hypothesis, &steps));
-    let facts = Facts {
-        instrument: dataset.instrument,
-        period_deg: dataset.start.period_rad.to_degrees(),
-        tells_gain: true,
-        stated: dataset.screen.stated(),
-        held_out: after.errors().count(),
-        fitted_rms_deg: on_fit.mean_square().sqrt().to_degrees(),
-    };
-    let mut report = Report {
-        schema: SCHEMA.into(),
-        status: Status::Answered,
-        reason: None,
-        tool: Tool::default(),
-        inputs,
-        device: device.clone(),
-        instrument: match dataset.instrument {
-            Instrument::Gyroscope => "gyroscope".into(),
-            Instrument::Sensor => "sensor".into(),
-        },
-        angular_gain: knowledge.angular_gain(),
-        detection_gain_ratio,
-        actuation_gain_ratio,
-        effects,
-        heldout: Heldout {
-            raw: Some(raw.size()),
-            declared: before.size(),
-            discovered: after.size(),
-            noise_floor_deg: noise_floor.to_degrees(),
-        },
-        steps: stages(Some(&raw), &before, &after, &steps),
-        residual: ResidualReport {
-            harmonics: [Follows::Pattern, Follows::Table]
-                .into_iter()
-                .flat_map(|of| reported_harmonics(&after, of, &after))
-                .collect(),
-            white,
-        },
-        channels: left,
-        unexplained,
-        runs,
-        decomposition: Vec::new(),
-        proposals,
-        scale_factor,
-        allan: None,
-        decay: None,
-        warnings,
-    };
-    let provenance = Provenance { tool: Some(Tool::default()), inputs: report.inputs.clone(), amplitude_v };
-    let mut calibration = Calibration { device, hypothesis: fitted.fit.hypothesis, provenance };
-    gate::pass(&report, &calibration, facts)?;
-    if let Some(reason) = no_better(&report.heldout, after.errors().count()) {
-        (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
-        report.warnings.insert(0, reason);
-        calibration.hypothesis = ideal;
-    }
-    Ok(Identification {
-        report,
-        figures: figures(&dataset, Some(&raw), &before, &after, fitted.ring_downs),
-        calibration,
-        steps,
-        plots,
-    })
+}
+
+/// Says what an effect cannot be told from, and what would.
+fn confounded(e: &EffectReport) -> String {
+    format!(
+        "{} is confounded with {} in this campaign; {} would separate them",
+        e.id,
+        e.confounded_with.join(", "),
+        e.separated_by.as_deref().unwrap_or("another run")
+    )
 }
 
 /// Says that effects as text had no part in an answer.
@@ -399,225 +456,4 @@ fn figures(
         })
         .collect();
     Figures { bias, ring_downs }
-}
-
-/// What a fit knows, with how sure it is.
-struct Knowledge<'a> {
-    dataset: &'a Dataset,
-    fitted: &'a Fitted,
-    covariance: &'a DMatrix<f64>,
-}
-
-impl Knowledge<'_> {
-    fn hypothesis(&self) -> &Hypothesis {
-        &self.fitted.fit.hypothesis
-    }
-
-    fn index(&self, unknown: Unknown) -> Option<usize> {
-        self.fitted.fit.unknowns.iter().position(|u| *u == unknown)
-    }
-
-    fn deviation(&self, unknown: Unknown) -> f64 {
-        self.index(unknown).map_or(0.0, |i| self.covariance[(i, i)].max(0.0).sqrt())
-    }
-
-    fn estimate(&self, unknown: Unknown) -> Estimate {
-        Estimate::new(self.hypothesis().get(unknown), self.deviation(unknown))
-    }
-
-    /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
-    /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for.
-    fn angular_gain(&self) -> Estimate {
-        let estimate = self.estimate(Unknown::AngularGain);
-        let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
-        let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
-        let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
-        let slowed: f64 = causeless
-            .filter(|m| m.id.description().stage == Stage::Mechanics)
-            .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
-            .sum();
-        estimate.widened(slowed * estimate.value.abs())
-    }
-
-    /// The first parameter of the first member `id`, if it was fitted.
-    fn first(&self, id: EffectId) -> Option<Unknown> {
-        let unknown = Unknown::Effect(self.hypothesis().position(id)?, 0);
-        self.index(unknown).map(|_| unknown)
-    }
-
-    fn detection_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
-        let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
-        let told = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
-        if told.is_none() {
-            warnings.push("the campaign cannot tell the detection gain ratio".into());
-        }
-        told
-    }
-
-    fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
-        if self.dataset.instrument == Instrument::Sensor {
-            warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
-            return None;
-        }
-        let unknown = self.first(EffectId::ActuationGainMismatch);
-        let told = unknown
-            .filter(|u| self.deviation(*u) < MIN_CONTRACTION * belief::ACTUATION_RATIO)
-            .map(|u| self.estimate(u))
-            .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
-            .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
-        match (&told, &self.fitted.drive) {
-            (None, _) => warnings.push(
-                "the campaign cannot tell the actuation gain ratio: ring-downs at 0° and 90° with vas_v would".into(),
-            ),
-            (Some(_), None) => warnings.push(
-                "the actuation gain ratio comes from rotation runs alone: ring-downs at 0° and 90° would confirm it"
-                    .into(),
-            ),
-            (Some(estimate), Some(drive)) => {
-                let deviation = (estimate.half_width() / 1.96).hypot(drive.ratio() * drive.ratio_error);
-                if (estimate.value - drive.ratio()).abs() > 4.0 * deviation {
-                    warnings.push(format!(
-                        "ring-downs (Equation 11) give an actuation gain ratio of {:.5}, all runs together {:.5}",
-                        drive.ratio(),
-                        estimate.value
-                    ));
-                }
-            }
-        }
-        told
-    }
-
-    /// A member's deviations are well below what was believed without data.
-    fn identifiable(&self, at: usize, member: &Member) -> bool {
-        let scale = match member.id {
-            EffectId::Anisodamping => belief::ANISODAMPING_PER_S,
-            EffectId::Anisoelasticity => belief::ANISOELASTICITY_RAD_S,
-            EffectId::ActuationGainMismatch => belief::ACTUATION_RATIO,
-            _ => f64::INFINITY,
-        };
-        let fitted = (0..member.id.description().parameters.len())
-            .map(|p| Unknown::Effect(at, p))
-            .filter(|u| self.index(*u).is_some())
-            .collect::<Vec<_>>();
-        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < MIN_CONTRACTION * scale)
-    }
-
-    fn effects(&self, steps: &[Step], after: &Evaluation) -> Vec<EffectReport> {
-        let with = after.size().rms_deg;
-        let mut steps: Vec<&Step> = steps.iter().collect();
-        let alike = self.dataset.alike();
-        self.hypothesis()
-            .members
-            .iter()
-            .enumerate()
-            .filter(|(at, m)| self.identifiable(*at, m))
-            .map(|(at, m)| {
-                let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
-                let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
-                for r in step.map(|s| s.confounded_with.as_slice()).unwrap_or_default() {
-                    if !rivals.contains(r) {
-                        rivals.push(*r);
-                    }
-                }
-                let mut without = self.hypothesis().clone();
-                without.members.remove(at);
-                let before = step.map_or_else(
-                    || {
-                        let e = evaluate(
-                            &self.dataset.tracks,
-                            &without,
-                            &self.fitted.fit.starts,
-                            Role::Holdout,
-                            Window::Whole,
-                            Some(after),
-                        );
-                        e.size().rms_deg
-                    },
-                    |s| s.heldout_rms_deg[0],
-                );
-                let after_deg = step.map_or(with, |s| s.heldout_rms_deg[1]);
-                EffectReport {
-                    id: m.id.to_string(),
-                    origin: m.origin,
-                    parameters: self.parameters(at, m),
-                    heldout_rms_deg: before.is_finite().then_some(BeforeAfter { before, after: after_deg }),
-                    evidence: evidence(m, step),
-                    separated_by: rivals.first().map(|r| separated_by(m.id, *r, alike).to_string()),
-                    confounded_with: rivals.iter().map(ToString::to_string).collect(),
-                }
-            })
-            .collect()
-    }
-
-    /// A member's parameters as they are shown, polar ones with intervals by propagation.
-    fn parameters(&self, at: usize, member: &Member) -> Vec<ParameterReport> {
-        let d = member.id.description();
-        let mut out = Vec::new();
-        for shown in d.shown {
-            match *shown {
-                Shown::Plain(p) => {
-                    let parameter = &d.parameters[p];
-                    let hidden = parameter.role == ParameterRole::Refined && !member.refined;
-                    if !hidden {
-                        let unknown = Unknown::Effect(at, p);
-                        out.push(ParameterReport {
-                            name: parameter.name.into(),
-                            unit: parameter.unit.into(),
-                            value: member.values[p],
-                            ci95: self.index(unknown).map(|_| self.estimate(unknown).ci95),
-                        });
-                    }
-                }
-                Shown::Polar { cos, sin, magnitude, unit, angle, division } => {
-                    let (c, s) = (member.values[cos], member.values[sin]);
-                    let size = c.hypot(s).max(f64::MIN_POSITIVE);
-                    let (vc, vs, vcs) = self.block(at, cos, sin);
-                    let deviation = ((c * c * vc + s * s * vs + 2.0 * c * s * vcs).max(0.0)).sqrt() / size;
-                    let turn = ((s * s * vc + c * c * vs - 2.0 * c * s * vcs).max(0.0)).sqrt() / (size * size);
-                    let phase = (s.atan2(c) / division).to_degrees();
-                    let phase_deviation = (turn / division).to_degrees();
-                    let entry = |name: &str, unit: &str, e: Estimate| ParameterReport {
-                        name: name.into(),
-                        unit: unit.into(),
-                        value: e.value,
-                        ci95: Some(e.ci95),
-                    };
-                    out.push(entry(magnitude, unit, Estimate::new(c.hypot(s), deviation)));
-                    out.push(entry(angle, "deg", Estimate::new(phase, phase_deviation)));
-                }
-            }
-        }
-        out
-    }
-
-    /// Variances and covariance of two parameters of a member.
-    fn block(&self, at: usize, one: usize, other: usize) -> (f64, f64, f64) {
-        match (self.index(Unknown::Effect(at, one)), self.index(Unknown::Effect(at, other))) {
-            (Some(i), Some(j)) => (self.covariance[(i, i)], self.covariance[(j, j)], self.covariance[(i, j)]),
-            _ => (0.0, 0.0, 0.0),
-        }
-    }
-}
-
-/// One sentence on why an effect is believed.
-fn evidence(member: &Member, step: Option<&Step>) -> String {
-    let d = member.id.description();
-    let Some(step) = step else {
-        return match member.origin {
-            Origin::Declared => format!("declared by the paper's model ({})", d.signature),
-            _ => format!("needed to centre the readout before there is an angle ({})", d.signature),
-        };
-    };
-    let rivals =
-        step.rivals.iter().map(|(id, gain)| format!("{id} by {:.0}", step.gain - gain)).collect::<Vec<_>>().join(", ");
-    let beaten = if rivals.is_empty() { String::new() } else { format!("; beat {rivals}") };
-    let balance = step.energy_balance.map_or_else(String::new, |[before, after]| {
-        format!("; the energy balance leaves {:.1} ppm of the amplitude instead of {:.1}", 1e6 * after, 1e6 * before)
-    });
-    let inconsistency =
-        step.inconsistency.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
-    format!(
-        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
-        d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
-    )
 }

@@ -5,6 +5,7 @@ pub(crate) mod channels;
 pub(crate) mod compensate;
 mod facts;
 pub(crate) mod gate;
+pub(crate) mod inference;
 pub(crate) mod laws;
 pub(crate) mod proposals;
 pub(crate) mod provenance;

@@ -1,0 +1,244 @@
+//! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
+//! the campaign tells it.
+
+use cvg_model::effects::{EffectId, Role as ParameterRole, Shown, Stage};
+use nalgebra::DMatrix;
+
+use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::estimation::identifiability::{confounded_with, separated_by};
+use crate::estimation::joint_fit::{Dataset, Fitted, belief};
+use crate::estimation::residuals::Window;
+use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
+use crate::recording::{Instrument, Role};
+use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport};
+use crate::selection::discovery::Step;
+
+/// Share of its prior's width to which an unknown must narrow to count as told by the data.
+const MIN_CONTRACTION: f64 = 0.1;
+/// Gain ratios known no better than this, as the half width of the interval, are no answer.
+const WIDEST_DETECTION_RATIO: f64 = 0.1;
+const WIDEST_ACTUATION_RATIO: f64 = 0.02;
+
+/// What a fit says of the instrument, with intervals.
+pub(crate) struct Inference<'a> {
+    pub(crate) dataset: &'a Dataset,
+    pub(crate) fitted: &'a Fitted,
+    pub(crate) covariance: &'a DMatrix<f64>,
+}
+
+impl Inference<'_> {
+    fn hypothesis(&self) -> &Hypothesis {
+        &self.fitted.fit.hypothesis
+    }
+
+    fn index(&self, unknown: Unknown) -> Option<usize> {
+        self.fitted.fit.unknowns.iter().position(|u| *u == unknown)
+    }
+
+    fn deviation(&self, unknown: Unknown) -> f64 {
+        self.index(unknown).map_or(0.0, |i| self.covariance[(i, i)].max(0.0).sqrt())
+    }
+
+    fn estimate(&self, unknown: Unknown) -> Estimate {
+        Estimate::new(self.hypothesis().get(unknown), self.deviation(unknown))
+    }
+
+    /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
+    /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for.
+    pub(crate) fn angular_gain(&self) -> Estimate {
+        let estimate = self.estimate(Unknown::AngularGain);
+        let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
+        let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
+        let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
+        let slowed: f64 = causeless
+            .filter(|m| m.id.description().stage == Stage::Mechanics)
+            .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
+            .sum();
+        estimate.widened(slowed * estimate.value.abs())
+    }
+
+    /// The first parameter of the first member `id`, if it was fitted.
+    fn first(&self, id: EffectId) -> Option<Unknown> {
+        let unknown = Unknown::Effect(self.hypothesis().position(id)?, 0);
+        self.index(unknown).map(|_| unknown)
+    }
+
+    /// G_Dy/G_Dx, where the campaign tells it.
+    pub(crate) fn detection_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+        let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
+        let told = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
+        if told.is_none() {
+            warnings.push("the campaign cannot tell the detection gain ratio".into());
+        }
+        told
+    }
+
+    /// G_Ax/G_Ay, where the campaign tells it.
+    pub(crate) fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+        if self.dataset.instrument == Instrument::Sensor {
+            warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
+            return None;
+        }
+        let unknown = self.first(EffectId::ActuationGainMismatch);
+        let told = unknown
+            .filter(|u| self.deviation(*u) < MIN_CONTRACTION * belief::ACTUATION_RATIO)
+            .map(|u| self.estimate(u))
+            .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
+            .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
+        match (&told, &self.fitted.drive) {
+            (None, _) => warnings.push(
+                "the campaign cannot tell the actuation gain ratio: ring-downs at 0° and 90° with vas_v would".into(),
+            ),
+            (Some(_), None) => warnings.push(
+                "the actuation gain ratio comes from rotation runs alone: ring-downs at 0° and 90° would confirm it"
+                    .into(),
+            ),
+            (Some(estimate), Some(drive)) => {
+                let deviation = (estimate.half_width() / 1.96).hypot(drive.ratio() * drive.ratio_error);
+                if (estimate.value - drive.ratio()).abs() > 4.0 * deviation {
+                    warnings.push(format!(
+                        "ring-downs (Equation 11) give an actuation gain ratio of {:.5}, all runs together {:.5}",
+                        drive.ratio(),
+                        estimate.value
+                    ));
+                }
+            }
+        }
+        told
+    }
+
+    /// A member's deviations are well below what was believed without data.
+    pub(crate) fn identifiable(&self, at: usize, member: &Member) -> bool {
+        let scale = match member.id {
+            EffectId::Anisodamping => belief::ANISODAMPING_PER_S,
+            EffectId::Anisoelasticity => belief::ANISOELASTICITY_RAD_S,
+            EffectId::ActuationGainMismatch => belief::ACTUATION_RATIO,
+            _ => f64::INFINITY,
+        };
+        let fitted = (0..member.id.description().parameters.len())
+            .map(|p| Unknown::Effect(at, p))
+            .filter(|u| self.index(*u).is_some())
+            .collect::<Vec<_>>();
+        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < MIN_CONTRACTION * scale)
+    }
+
+    /// Every effect that the campaign tells, in the words of the report.
+    pub(crate) fn effects(&self, steps: &[Step], after: &Evaluation) -> Vec<EffectReport> {
+        let with = after.size().rms_deg;
+        let mut steps: Vec<&Step> = steps.iter().collect();
+        let alike = self.dataset.alike();
+        self.hypothesis()
+            .members
+            .iter()
+            .enumerate()
+            .filter(|(at, m)| self.identifiable(*at, m))
+            .map(|(at, m)| {
+                let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
+                let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
+                for r in step.map(|s| s.confounded_with.as_slice()).unwrap_or_default() {
+                    if !rivals.contains(r) {
+                        rivals.push(*r);
+                    }
+                }
+                let mut without = self.hypothesis().clone();
+                without.members.remove(at);
+                let before = step.map_or_else(
+                    || {
+                        let e = evaluate(
+                            &self.dataset.tracks,
+                            &without,
+                            &self.fitted.fit.starts,
+                            Role::Holdout,
+                            Window::Whole,
+                            Some(after),
+                        );
+                        e.size().rms_deg
+                    },
+                    |s| s.heldout_rms_deg[0],
+                );
+                let after_deg = step.map_or(with, |s| s.heldout_rms_deg[1]);
+                EffectReport {
+                    id: m.id.to_string(),
+                    origin: m.origin,
+                    parameters: self.parameters(at, m),
+                    heldout_rms_deg: before.is_finite().then_some(BeforeAfter { before, after: after_deg }),
+                    evidence: evidence(m, step),
+                    separated_by: rivals.first().map(|r| separated_by(m.id, *r, alike).to_string()),
+                    confounded_with: rivals.iter().map(ToString::to_string).collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// A member's parameters as they are shown, polar ones with intervals by propagation.
+    fn parameters(&self, at: usize, member: &Member) -> Vec<ParameterReport> {
+        let d = member.id.description();
+        let mut out = Vec::new();
+        for shown in d.shown {
+            match *shown {
+                Shown::Plain(p) => {
+                    let parameter = &d.parameters[p];
+                    let hidden = parameter.role == ParameterRole::Refined && !member.refined;
+                    if !hidden {
+                        let unknown = Unknown::Effect(at, p);
+                        out.push(ParameterReport {
+                            name: parameter.name.into(),
+                            unit: parameter.unit.into(),
+                            value: member.values[p],
+                            ci95: self.index(unknown).map(|_| self.estimate(unknown).ci95),
+                        });
+                    }
+                }
+                Shown::Polar { cos, sin, magnitude, unit, angle, division } => {
+                    let (c, s) = (member.values[cos], member.values[sin]);
+                    let size = c.hypot(s).max(f64::MIN_POSITIVE);
+                    let (vc, vs, vcs) = self.block(at, cos, sin);
+                    let deviation = ((c * c * vc + s * s * vs + 2.0 * c * s * vcs).max(0.0)).sqrt() / size;
+                    let turn = ((s * s * vc + c * c * vs - 2.0 * c * s * vcs).max(0.0)).sqrt() / (size * size);
+                    let phase = (s.atan2(c) / division).to_degrees();
+                    let phase_deviation = (turn / division).to_degrees();
+                    let entry = |name: &str, unit: &str, e: Estimate| ParameterReport {
+                        name: name.into(),
+                        unit: unit.into(),
+                        value: e.value,
+                        ci95: Some(e.ci95),
+                    };
+                    out.push(entry(magnitude, unit, Estimate::new(c.hypot(s), deviation)));
+                    out.push(entry(angle, "deg", Estimate::new(phase, phase_deviation)));
+                }
+            }
+        }
+        out
+    }
+
+    /// Variances and covariance of two parameters of a member.
+    fn block(&self, at: usize, one: usize, other: usize) -> (f64, f64, f64) {
+        match (self.index(Unknown::Effect(at, one)), self.index(Unknown::Effect(at, other))) {
+            (Some(i), Some(j)) => (self.covariance[(i, i)], self.covariance[(j, j)], self.covariance[(i, j)]),
+            _ => (0.0, 0.0, 0.0),
+        }
+    }
+}
+
+/// One sentence on why an effect is believed.
+fn evidence(member: &Member, step: Option<&Step>) -> String {
+    let d = member.id.description();
+    let Some(step) = step else {
+        return match member.origin {
+            Origin::Declared => format!("declared by the paper's model ({})", d.signature),
+            _ => format!("needed to centre the readout before there is an angle ({})", d.signature),
+        };
+    };
+    let rivals =
+        step.rivals.iter().map(|(id, gain)| format!("{id} by {:.0}", step.gain - gain)).collect::<Vec<_>>().join(", ");
+    let beaten = if rivals.is_empty() { String::new() } else { format!("; beat {rivals}") };
+    let balance = step.energy_balance.map_or_else(String::new, |[before, after]| {
+        format!("; the energy balance leaves {:.1} ppm of the amplitude instead of {:.1}", 1e6 * after, 1e6 * before)
+    });
+    let inconsistency =
+        step.inconsistency.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
+    format!(
+        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
+        d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
+    )
+}
