@@ -36,18 +36,6 @@ fn most_rad_s(s: &Settings<'_>) -> f64 {
     1.1 * TAU * s.carrier_hz * s.band
 }
 
-const MODES: [Mode; 9] = [
-    Mode::Listen,
-    Mode::Sweep,
-    Mode::Lock,
-    Mode::SpinUp,
-    Mode::WholeAngle,
-    Mode::Hold,
-    Mode::RingDown,
-    Mode::Coast,
-    Mode::Fault,
-];
-
 /// What is out of its bounds, if anything is.
 fn beyond<T: Scalar>(s: &Settings<'_>, state: &State<T>) -> Option<&'static str> {
     let near_one = |cos: T, sin: T| {
@@ -125,7 +113,7 @@ fn anywhere_within<T: Scalar>(s: &Settings<'_>, dice: &mut ChaCha8Rng) -> State<
 /// Modes and counts: any.
 fn history<T: Scalar>(state: &mut State<T>, dice: &mut ChaCha8Rng) {
     let v = &mut state.supervisor;
-    v.mode = MODES[dice.random_range(0..MODES.len())];
+    v.mode = Mode::ALL[dice.random_range(0..Mode::ALL.len())];
     v.fault = Some([Fault::InvalidSamples, Fault::NoLock, Fault::AmplitudeHigh][dice.random_range(0..3)]);
     v.wish = [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off][dice.random_range(0..4)];
     let few = |dice: &mut ChaCha8Rng| dice.next_u32() >> dice.random_range(0..32_u32);

@@ -40,6 +40,21 @@ pub enum Mode {
     Fault,
 }
 
+impl Mode {
+    /// Every mode, in the order in which an instrument meets them.
+    pub const ALL: [Self; 9] = [
+        Self::Listen,
+        Self::Sweep,
+        Self::Lock,
+        Self::SpinUp,
+        Self::WholeAngle,
+        Self::Hold,
+        Self::RingDown,
+        Self::Coast,
+        Self::Fault,
+    ];
+}
+
 /// Why an instrument stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {

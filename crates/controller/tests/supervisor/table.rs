@@ -24,17 +24,6 @@ impl Dice {
     }
 }
 
-const MODES: [Mode; 9] = [
-    Mode::Listen,
-    Mode::Sweep,
-    Mode::Lock,
-    Mode::SpinUp,
-    Mode::WholeAngle,
-    Mode::Hold,
-    Mode::RingDown,
-    Mode::Coast,
-    Mode::Fault,
-];
 const FAULTS: [Option<Fault>; 5] =
     [None, Some(Fault::DeadChannel), Some(Fault::InvalidSamples), Some(Fault::NoLock), Some(Fault::AmplitudeHigh)];
 /// Windows of a start, all its modes together, twice.
@@ -70,7 +59,7 @@ fn any_count(dice: &mut Dice) -> u32 {
 fn any_state(dice: &mut Dice) -> SupervisorState {
     let few = |dice: &mut Dice| if dice.rarely() { any_count(dice) } else { 0 };
     SupervisorState {
-        mode: dice.of(&MODES),
+        mode: dice.of(&Mode::ALL),
         fault: dice.of(&FAULTS),
         wish: dice.of(&[Wish::WholeAngle, Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]),
         windows: any_count(dice),
