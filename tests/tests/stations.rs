@@ -154,5 +154,6 @@ fn a_table_beside_a_readout_widens_the_interval_of_the_gain() {
         // of the skewed plate the part along y: 0.9 cos 0.12, as the library counts gain and skew
         let truth = 0.9 * 0.12_f64.cos();
         assert!((ratio.value - truth).abs() < 2.0 * ratio.half_width(), "seed {seed}: {ratio:?}, {truth}");
+        assert!(ratio.half_width() < 0.05, "seed {seed}: {ratio:?} says nothing");
     }
 }

@@ -22,7 +22,7 @@ const BETTER: f64 = 1.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Tolerance {
     /// half of the usual one, an engineering choice for interleaved blocks: those of a few dozen stations are single rows,
-    /// their standard error is wide, and a whole one leaves a fifth more error than needed
+    /// their standard error is wide, and a whole one leaves more error than is needed
     Half,
     /// one (Breiman et al. 1984)
     One,

@@ -88,22 +88,30 @@ impl<'a> Selection<'a> {
         let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
         let fronts = if self.channels() { self.readouts(&mut pool) } else { vec![None] };
         let Some(first) = fronts.first() else { return Vec::new() };
+        let constant = Shape::constant(self.sensor.free_gain);
+        let raw = self.losses_of(plain, &constant);
         let motions = self.motions(*first);
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
         let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(|t| choose(&pool, *t).cloned()).collect();
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
-        chosen.into_iter().map(|c| self.with_lines(c, plain)).collect()
+        let with_lines = |c| {
+            let Candidate { model, losses, .. } = self.with_lines(c);
+            Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses }
+        };
+        chosen.into_iter().map(with_lines).collect()
     }
 
     /// A model with the isolated lines that it leaves.
-    fn with_lines(&mut self, mut chosen: Candidate<Model>, plain: Option<Front>) -> Selected {
+    fn with_lines(&mut self, mut chosen: Candidate<Model>) -> Candidate<Model> {
         for _ in 0..MOST_LINES {
             let Some(better) = self.with_a_line(&chosen) else { break };
             chosen = better;
         }
-        let constant = Shape::constant(self.sensor.free_gain);
-        let mut alone = |front| self.offer(&[front], std::slice::from_ref(&constant)).pop().map(|c| c.losses);
-        Selected { readout_alone: alone(chosen.model.0), raw: alone(plain), model: chosen.model, losses: chosen.losses }
+        chosen
+    }
+
+    fn losses_of(&mut self, front: Option<Front>, shape: &Shape) -> Option<Losses> {
+        self.offer(&[front], std::slice::from_ref(shape)).pop().map(|c| c.losses)
     }
 
     fn channels(&self) -> bool {

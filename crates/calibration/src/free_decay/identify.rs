@@ -83,6 +83,7 @@ impl Head {
 
 /// Part of a run, in four parts, that is held out where no run is.
 const FITTED_QUARTERS: usize = 3;
+
 /// Identifies a campaign that [`serves`].
 ///
 /// # Errors

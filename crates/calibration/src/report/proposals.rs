@@ -30,7 +30,7 @@ const SHORTEST_SETTLING: f64 = 0.01;
 const SETTLES: f64 = 0.3;
 
 /// What the fitted runs say, for laws.
-struct Witness<'a> {
+struct FittedRuns<'a> {
     dataset: &'a Dataset,
     fit: &'a Fit,
     on_fit: &'a Evaluation,
@@ -54,19 +54,19 @@ pub(crate) fn proposals(
         return Vec::new();
     }
     let cost = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
-    let witness = Witness { dataset, fit, on_fit, channels, amplitudes: amplitudes(dataset, fit), cost };
+    let runs = FittedRuns { dataset, fit, on_fit, channels, amplitudes: amplitudes(dataset, fit), cost };
     let mut texts: Vec<EffectText> = Vec::new();
     let mut harmonics: Vec<f64> = Vec::new();
     for (at, m) in members.iter().enumerate().filter(|(_, m)| empirical(m)) {
         if m.id != EffectId::HarmonicN {
-            texts.extend(witness.other(at, m));
+            texts.extend(runs.other(at, m));
         } else if !harmonics.contains(&m.values[0]) {
             harmonics.push(m.values[0]);
-            texts.push(witness.corrected_harmonic(m.values[0]));
+            texts.push(runs.corrected_harmonic(m.values[0]));
         }
     }
     if texts.is_empty() {
-        texts.extend(left.iter().find_map(|u| witness.left(u)));
+        texts.extend(left.iter().find_map(|u| runs.left(u)));
     }
     let mut out: Vec<EffectText> = Vec::new();
     for mut text in texts {
@@ -87,7 +87,7 @@ struct Part {
     size_rad: f64,
 }
 
-impl Witness<'_> {
+impl FittedRuns<'_> {
     /// What is left without the members that `taken` chooses.
     fn without(&self, taken: impl Fn(usize, &Member) -> bool) -> Evaluation {
         let mut without = self.fit.hypothesis.clone();
