@@ -272,7 +272,7 @@ impl Found {
             runs,
             decomposition: Vec::new(),
             proposals,
-            scale_factor: self.scale_factor.clone(),
+            scale_factor: self.scale_factor,
             allan: None,
             decay: None,
             warnings,
