@@ -1,7 +1,7 @@
 //! Which rows of a table become the recording: those with a time, a reference and an angle, each time once.
 //!
-//! What is left out is counted with its place and said in a warning. Values are never changed: spikes and implausible
-//! motion are not seen here. A time that goes back is refused, except for a row that an earlier row says word for word.
+//! What is left out is counted with its place and said in a warning. Values are changed by the conversion of their
+//! unit alone, where one is written: spikes and implausible motion are not seen here. A time that goes back is refused, except for a row that an earlier row says word for word.
 
 use std::path::Path;
 
@@ -9,13 +9,16 @@ use super::Recording;
 use super::channel::Channel;
 use super::dropped::{Dropped, Tally};
 use super::error::{Place, ReadError};
+use super::naming::Naming;
 use super::requirement;
 use super::table::{NumberColumn, Table};
+use super::units::{self, Conversion};
 use super::unknown::{Cells, UnknownColumn};
 
 /// Makes the recording of a table.
-pub(super) fn admit(mut table: Table, source: &Path) -> Result<Recording, ReadError> {
+pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let mut warnings = std::mem::take(&mut table.warnings);
+    convert(&mut table, naming, source, &mut warnings)?;
     if table.rows == 0 && table.truncated.is_none() {
         return Err(ReadError::NoRows { path: source.to_path_buf(), place: table.header });
     }
@@ -46,6 +49,49 @@ pub(super) fn admit(mut table: Table, source: &Path) -> Result<Recording, ReadEr
     dropped.missing_values.retain(|(channel, _)| table.numbers.iter().any(|column| column.channel == *channel));
     say(&table, &dropped, &mut warnings);
     Ok(assemble(table, source, dropped, warnings))
+}
+
+/// Takes every column to the unit of its channel: by the factor of the mapping, else by the unit that the file states below
+/// the name, else by that in the name.
+fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec<String>) -> Result<(), ReadError> {
+    let is_readout = |channel| matches!(channel, Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys);
+    let of_readout: Vec<&str> = table.units.iter().filter(|(c, _)| is_readout(*c)).map(|(_, u)| u.as_str()).collect();
+    let is_one = of_readout.windows(2).all(|pair| pair[0] == pair[1]);
+    for column in &mut table.numbers {
+        let channel = column.channel;
+        let own = table.units.iter().find(|(other, _)| *other == channel).map(|(_, unit)| unit.as_str());
+        let by = if let Some(factor) = naming.factor(channel) {
+            if let Some(unit) = own.filter(|unit| units::conversion(channel, unit) != Some(Conversion::by(factor))) {
+                warnings
+                    .push(format!("`{channel}` is said to be in {unit}; the factor {factor} of the mapping is taken"));
+            }
+            Conversion::by(factor)
+        } else if let Some(unit) = own {
+            match units::conversion(channel, unit) {
+                Some(by) => by,
+                // a sensor's channels may be in any unit that both have
+                None if is_readout(channel) && is_one => {
+                    warnings.push(format!("`{channel}` is in {unit} and kept in it"));
+                    continue;
+                }
+                None => {
+                    let column = naming.column(channel).unwrap_or(channel.name()).to_owned();
+                    let (path, unit, wanted) = (source.to_path_buf(), unit.to_owned(), units::of_channel(channel));
+                    return Err(ReadError::Unit { path, channel, unit, wanted, column });
+                }
+            }
+        } else {
+            naming.unit(channel).map_or(Conversion::NONE, |(_, by)| by)
+        };
+        if by == Conversion::NONE {
+            continue;
+        }
+        if let (None, Some(unit)) = (naming.factor(channel), own.or(naming.unit(channel).map(|(unit, _)| unit))) {
+            warnings.push(format!("`{channel}` is in {unit} and taken to {}", units::of_channel(channel)));
+        }
+        column.values.iter_mut().for_each(|value| *value = by.of(*value));
+    }
+    Ok(())
 }
 
 /// A column without a single value is as good as absent; what is left must still be a recording.

@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::channel::Channel;
+use super::gzip::Stopped;
+use super::memory;
 
 /// Where in a file: lines of text start at 1 (the header counts), rows of a table without lines as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -244,6 +246,24 @@ pub enum ReadError {
         /// The columns that are there.
         present: String,
     },
+    /// A column is in a unit that is not known to be one of its channel.
+    #[error(
+        "{}: `{channel}` is in {unit:?}; wanted {wanted}, or the factor that takes it there: \
+         --map '{channel}={column}*FACTOR', or the same in the [columns] of a campaign.toml (a factor of 1 keeps it)",
+        path.display()
+    )]
+    Unit {
+        /// The path as given.
+        path: PathBuf,
+        /// The channel.
+        channel: Channel,
+        /// The unit as it is written.
+        unit: String,
+        /// The unit of the channel.
+        wanted: &'static str,
+        /// What the file calls the column.
+        column: String,
+    },
     /// The campaign file says something that it cannot mean.
     #[error("{}: line {line}, column {column}: {what}; wanted {wanted}", path.display())]
     Campaign {
@@ -261,9 +281,19 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// The error for a failed system call, with the two that have a plainer name told apart.
+    /// The error for a failed system call, with those that have a plainer name told apart.
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();
+        if let Some(stopped) = source.get_ref().and_then(|error| error.downcast_ref::<Stopped>()) {
+            let allowed = memory::memory_limit();
+            return match stopped {
+                Stopped::TooLarge => {
+                    let (what, needed) = ("what gzip has compressed".to_owned(), allowed.saturating_add(1));
+                    Self::TooLarge { path, what, needed, allowed }
+                }
+                Stopped::Damaged(what) => Self::Container { path, kind: "a gzip file", what: what.clone() },
+            };
+        }
         match source.kind() {
             io::ErrorKind::NotFound => Self::NotFound { path },
             io::ErrorKind::IsADirectory => Self::Directory { path },

@@ -29,12 +29,15 @@ pub(super) struct Layout {
     pub(super) channels: Vec<Channel>,
     /// The names of the other columns, in the order of the file.
     pub(super) unknown: Vec<String>,
+    /// Whether rows may end before the last column.
+    pub(super) is_last_optional: bool,
 }
 
 impl Layout {
     /// Understands the names in a header. Nameless columns are unknown columns, and may be many.
     pub(super) fn new<S: AsRef<str>>(header: &[S], naming: &Naming, source: &Path) -> Result<Self, ReadError> {
-        let mut layout = Self { names: vec![], fields: vec![], channels: vec![], unknown: vec![] };
+        let mut layout =
+            Self { names: vec![], fields: vec![], channels: vec![], unknown: vec![], is_last_optional: false };
         for name in header {
             let name = name.as_ref().trim();
             if let Some(channel) = naming.channel(name) {

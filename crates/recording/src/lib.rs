@@ -1,7 +1,7 @@
 //! Recordings and campaigns: files in, columns of numbers out, and what is wrong with a file and where.
 //!
 //! A recording is read from CSV (RFC 4180 and its usual dialects), Parquet, MATLAB's `.mat` or HDF5, the last three by
-//! features of their names, all on by default. Dirt that has one meaning is handled: rows without a time, a reference or
+//! features of their names, all on by default; all but Parquet as gzip has compressed them, too. Dirt that has one meaning is handled: rows without a time, a reference or
 //! an angle, repeated time stamps and a cut-off last line are dropped, counted ([`Dropped`]) and said in
 //! [`Recording::warnings`]. Dirt that could mean two things is refused with file, line and column ([`ReadError`]). No
 //! value is ever changed or made up, and nothing here judges the instrument: spikes, rates and angles are the
@@ -15,6 +15,7 @@ mod channel;
 mod csv;
 mod dropped;
 mod error;
+mod gzip;
 mod layout;
 mod memory;
 mod naming;
@@ -22,6 +23,7 @@ mod open;
 mod parquet;
 mod requirement;
 mod table;
+mod units;
 mod unknown;
 
 use std::path::PathBuf;

@@ -1,13 +1,14 @@
-//! What the columns of a foreign file are called here: `theta_deg=Ch3`, `t_s=Time*0.001`.
+//! What the columns of a foreign file are called here: `theta_deg=Ch3`, `t_s=Time*0.001`, `t_s=Time/1000`.
 //!
-//! A name that is not mapped keeps its own meaning. Values are scaled only where the mapping says so.
+//! A name that is not mapped keeps its own meaning. Values are scaled where the mapping says so; where it says nothing, by
+//! the unit that stands in brackets at the end of a mapped name.
 
 use std::path::Path;
 
-use super::Recording;
 use super::channel::Channel;
 use super::error::ReadError;
 use super::requirement::in_words;
+use super::units::{self, Conversion};
 
 /// Which columns of a file are which channels, besides those that have a channel's own name.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -19,14 +20,16 @@ pub struct Naming {
 struct Entry {
     channel: Channel,
     column: String,
-    scale: f64,
+    /// The factor that the mapping states, be it 1.
+    scale: Option<f64>,
 }
 
 impl Naming {
     /// No mapping: columns mean what their names say.
     pub const NONE: &'static Self = &Self { entries: Vec::new() };
 
-    /// Adds `CHANNEL=COLUMN` or `CHANNEL=COLUMN*FACTOR`, the factor taking the column's unit to the channel's.
+    /// Adds `CHANNEL=COLUMN`, `CHANNEL=COLUMN*FACTOR` or `CHANNEL=COLUMN/DIVISOR`, which takes the column's unit to the
+    /// channel's. A column whose own name ends like this is meant by `CHANNEL=COLUMN*1`.
     ///
     /// # Errors
     /// What is wrong with it, and what would be right.
@@ -38,14 +41,17 @@ impl Naming {
             let names = in_words(Channel::ALL.into_iter().map(Channel::name));
             return Err(format!("`{}` is no channel; wanted one of {names}", channel.trim()));
         };
-        let factored = column.rsplit_once('*').and_then(|(c, f)| Some((c, f.trim().parse::<f64>().ok()?)));
-        let (column, scale) = factored.unwrap_or((column, 1.0));
-        let column = column.trim().to_owned();
+        let factored = column.rfind(['*', '/']).and_then(|at| {
+            let number = column[at + 1..].trim().parse::<f64>().ok()?;
+            Some((&column[..at], if column[at..].starts_with('*') { number } else { number.recip() }))
+        });
+        let scale = factored.map(|(_, scale)| scale);
+        let column = factored.map_or(column, |(column, _)| column).trim().to_owned();
         if column.is_empty() {
             return Err(format!("`{text}` names no column; wanted CHANNEL=COLUMN, as in theta_deg=Ch3"));
         }
-        if !scale.is_finite() || scale == 0.0 || (channel == Channel::Time && scale < 0.0) {
-            return Err(format!("`{text}`: the factor {scale} is none; wanted one like 0.001"));
+        if let Some(none) = scale.filter(|&s| !s.is_finite() || s == 0.0 || (channel == Channel::Time && s < 0.0)) {
+            return Err(format!("`{text}`: the factor {none} is none; wanted one like 0.001"));
         }
         if self.entries.iter().any(|e| e.channel == channel) {
             return Err(format!("`{channel}` is mapped twice"));
@@ -91,14 +97,20 @@ impl Naming {
         })
     }
 
-    /// Takes the units of mapped columns to those of their channels.
-    pub(super) fn scale(&self, recording: &mut Recording) {
-        for e in self.entries.iter().filter(|e| e.scale != 1.0) {
-            let scaled = recording.channel(e.channel).map(|values| values.iter().map(|v| v * e.scale).collect());
-            if let Some(values) = scaled {
-                recording.set_channel(e.channel, values);
-            }
-        }
+    /// The factor that the mapping states for a channel.
+    pub(super) fn factor(&self, channel: Channel) -> Option<f64> {
+        self.entries.iter().find(|e| e.channel == channel)?.scale
+    }
+
+    /// What a mapped column is called.
+    pub(super) fn column(&self, channel: Channel) -> Option<&str> {
+        self.entries.iter().find(|e| e.channel == channel).map(|e| e.column.as_str())
+    }
+
+    /// The unit that a mapped name ends with, and what takes it to the channel's; `None` where there is none that is known.
+    pub(super) fn unit(&self, channel: Channel) -> Option<(&str, Conversion)> {
+        let unit = units::in_brackets(self.column(channel)?)?;
+        Some((unit, units::conversion(channel, unit)?))
     }
 }
 
@@ -118,9 +130,23 @@ mod tests {
             ("xc_v=ch3", "mapped twice"),
             ("t_s=Time*-1", "factor"),
             ("xc_v=Ch1*0", "factor"),
+            ("xc_v=Ch1/0", "factor"),
         ] {
             assert!(naming.add(text).is_err_and(|e| e.contains(of)), "{text}: {:?}", naming.add(text));
         }
+    }
+
+    #[test]
+    fn a_column_may_be_multiplied_or_divided() {
+        let mut naming = Naming::default();
+        for entry in ["t_s=Time/1000", "xc_v=a*b * 2", "yc_v=rad/s", "temp_c=x/2*1"] {
+            assert_eq!(naming.add(entry), Ok(()), "{entry}");
+        }
+        let of = |channel| (naming.column(channel).expect("mapped"), naming.factor(channel));
+        assert_eq!(of(Channel::Time), ("Time", Some(0.001)));
+        assert_eq!(of(Channel::Xc), ("a*b", Some(2.0)));
+        assert_eq!(of(Channel::Yc), ("rad/s", None), "what is no number is part of the name");
+        assert_eq!(of(Channel::Temperature), ("x/2", Some(1.0)));
     }
 
     #[test]

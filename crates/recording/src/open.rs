@@ -1,21 +1,22 @@
-//! Which reader a file wants, told by its first bytes and its name.
+//! Which reader a file wants, told by its first bytes and its name; of a compressed file, by the first bytes in it.
 //!
 //! Refuses what is plainly something else (a directory, an archive, UTF-16 text) by saying what it is.
 
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use super::error::ReadError;
 use super::naming::Naming;
-use super::{Recording, arrays, csv, memory, parquet};
+use super::{Recording, arrays, csv, gzip, memory, parquet};
 
-const WANTED: &str = "CSV text in UTF-8, Parquet, MATLAB's .mat or HDF5";
+const WANTED: &str = "CSV text in UTF-8 (as it is or in gzip), Parquet, MATLAB's .mat or HDF5";
 /// First bytes that tell every kind of file.
 const HEAD: u64 = 16;
 
 impl Recording {
-    /// Reads a recording: Parquet, MATLAB's `.mat` (version 5 or 7.3) or HDF5 by their first bytes, CSV otherwise.
+    /// Reads a recording: Parquet, MATLAB's `.mat` (version 5 or 7.3) or HDF5 by their first bytes, CSV otherwise; CSV and
+    /// the files of arrays compressed with gzip as well.
     ///
     /// # Errors
     /// [`ReadError`]: the file is not there, is no recording, has no time or no angle, or has dirt that could mean two
@@ -36,20 +37,16 @@ impl Recording {
         if metadata.is_dir() {
             return Err(ReadError::Directory { path: path.to_path_buf() });
         }
-        let mut head = Vec::with_capacity(16);
-        (&mut file).take(HEAD).read_to_end(&mut head).map_err(io)?;
-        let mut recording = if head.starts_with(b"PAR1") {
-            parquet::read(file, naming, path)?
+        let head = head_of(&mut file).map_err(io)?;
+        if head.starts_with(b"PAR1") {
+            parquet::read(file, naming, path)
         } else if arrays::is_one(&head) {
             memory::allow(metadata.len(), "the file", path)?;
-            arrays::read(whole(head, file, path)?, naming, path)?
+            arrays::read(whole(head, file, path)?, naming, path)
         } else {
-            refuse_other_kinds(&head, path)?;
             let size = metadata.is_file().then_some(metadata.len());
-            csv::read(Cursor::new(head).chain(file), size, naming, path)?
-        };
-        naming.scale(&mut recording);
-        Ok(recording)
+            stream(head, file, size, naming, path)
+        }
     }
 
     /// Reads a recording that comes in one piece, as from standard input; `source` is the name that errors and warnings
@@ -58,20 +55,8 @@ impl Recording {
     /// # Errors
     /// As [`Recording::read_named`].
     pub fn read_from(mut reader: impl Read + Send, naming: &Naming, source: &Path) -> Result<Self, ReadError> {
-        let io = |error| ReadError::io(source, error);
-        let mut head = Vec::with_capacity(16);
-        (&mut reader).take(HEAD).read_to_end(&mut head).map_err(io)?;
-        let mut recording = if arrays::is_one(&head) {
-            arrays::read(whole(head, reader, source)?, naming, source)?
-        } else if head.starts_with(b"PAR1") {
-            let what = "is Parquet, which is read from its end".to_owned();
-            return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
-        } else {
-            refuse_other_kinds(&head, source)?;
-            csv::read(Cursor::new(head).chain(reader), None, naming, source)?
-        };
-        naming.scale(&mut recording);
-        Ok(recording)
+        let head = head_of(&mut reader).map_err(|error| ReadError::io(source, error))?;
+        stream(head, reader, None, naming, source)
     }
 
     /// Reads a recording from the bytes of a CSV file; `source` is the name that errors and warnings give it.
@@ -82,6 +67,48 @@ impl Recording {
         refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
         csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
     }
+}
+
+/// The first bytes of a file.
+fn head_of(reader: &mut impl Read) -> io::Result<Vec<u8>> {
+    let mut head = Vec::with_capacity(HEAD as usize);
+    reader.take(HEAD).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+/// Reads what comes in one piece; of the bytes of a file, `size` is their number where it is known.
+fn stream(
+    head: Vec<u8>,
+    rest: impl Read + Send,
+    size: Option<u64>,
+    naming: &Naming,
+    source: &Path,
+) -> Result<Recording, ReadError> {
+    if !gzip::is_one(&head) {
+        return unpacked(head, rest, size, naming, source);
+    }
+    let mut inner = gzip::Unfolding::new(Cursor::new(head).chain(rest));
+    let head = head_of(&mut inner).map_err(|error| ReadError::io(source, error))?;
+    unpacked(head, inner, None, naming, source)
+}
+
+/// Reads what is not compressed, or not any more.
+fn unpacked(
+    head: Vec<u8>,
+    rest: impl Read + Send,
+    size: Option<u64>,
+    naming: &Naming,
+    source: &Path,
+) -> Result<Recording, ReadError> {
+    if arrays::is_one(&head) {
+        return arrays::read(whole(head, rest, source)?, naming, source);
+    }
+    if head.starts_with(b"PAR1") {
+        let what = "is Parquet, which is read from its end".to_owned();
+        return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
+    }
+    refuse_other_kinds(&head, source)?;
+    csv::read(Cursor::new(head).chain(rest), size, naming, source)
 }
 
 /// All bytes of a file, which may have no end.
@@ -99,7 +126,7 @@ fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {
         return refuse("is text in UTF-16");
     }
     if magic.starts_with(&[0x1f, 0x8b]) {
-        return refuse("is compressed with gzip");
+        return refuse("is compressed with gzip twice");
     }
     if magic.starts_with(b"PK\x03\x04") {
         return refuse("is a zip archive or a spreadsheet");

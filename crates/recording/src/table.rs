@@ -56,6 +56,8 @@ pub(super) struct Table {
     pub(super) truncated: Option<Place>,
     /// The last row is there, but its line has no end.
     pub(super) unterminated: Option<Place>,
+    /// Units that the file states for channels, as they are written.
+    pub(super) units: Vec<(Channel, String)>,
     /// What the reader has to say besides.
     pub(super) warnings: Vec<String>,
 }
@@ -74,6 +76,7 @@ impl Table {
             blank_lines: Tally::default(),
             truncated: None,
             unterminated: None,
+            units: vec![],
             warnings: vec![],
         }
     }

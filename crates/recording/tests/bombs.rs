@@ -76,15 +76,24 @@ fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A column of zeros as MATLAB writes it: numbers that fit are stored in a byte each, and all is compressed.
-fn folded_zeros(name: &str, rows: usize) -> Vec<u8> {
+/// A column of zeros as MATLAB writes it: numbers that fit are stored in a byte each.
+fn zeros(name: &str, rows: usize) -> Vec<u8> {
     let flags = [6_u32.to_le_bytes(), 0_u32.to_le_bytes()].concat();
     let size = [u32::try_from(rows).unwrap().to_le_bytes(), 1_u32.to_le_bytes()].concat();
     let parts = [element(6, &flags), element(5, &size), element(1, name.as_bytes()), element(2, &vec![0; rows])];
+    element(14, &parts.concat())
+}
+
+/// An array as MATLAB writes it: compressed.
+fn folded(array: &[u8]) -> Vec<u8> {
     let mut folded = ZlibEncoder::new(vec![], Compression::best());
-    folded.write_all(&element(14, &parts.concat())).unwrap();
+    folded.write_all(array).unwrap();
     let folded = folded.finish().unwrap();
     [&15_u32.to_le_bytes(), &u32::try_from(folded.len()).unwrap().to_le_bytes(), folded.as_slice()].concat()
+}
+
+fn folded_zeros(name: &str, rows: usize) -> Vec<u8> {
+    folded(&zeros(name, rows))
 }
 
 fn mat_5(arrays: &[Vec<u8>]) -> Vec<u8> {
@@ -99,6 +108,25 @@ fn a_matlab_file_that_unfolds_to_more_than_is_allowed_is_refused() {
     let bytes = mat_5(&[folded_zeros("t_s", MANY), folded_zeros("theta_deg", MANY)]);
     assert!(bytes.len() < 100_000, "{} bytes", bytes.len());
     assert_too_large(read(&bytes));
+}
+
+/// A struct of the time and an angle, both zeros.
+fn folded_struct(rows: usize) -> Vec<u8> {
+    let flags = [2_u32.to_le_bytes(), 0_u32.to_le_bytes()].concat();
+    let size = [1_u32.to_le_bytes(), 1_u32.to_le_bytes()].concat();
+    let width = element(5, &10_u32.to_le_bytes());
+    let names = element(1, b"t_s\0\0\0\0\0\0\0theta_deg\0");
+    let head = [element(6, &flags), element(5, &size), element(1, b"run"), width, names].concat();
+    folded(&element(14, &[head, zeros("", rows), zeros("", rows)].concat()))
+}
+
+#[test]
+fn a_matlab_struct_that_unfolds_to_more_than_is_allowed_is_refused() {
+    // a fifth of what is allowed as bytes, and several times as much as numbers
+    let bytes = mat_5(&[folded_struct(MANY / 4)]);
+    assert!(bytes.len() < 100_000, "{} bytes", bytes.len());
+    assert_too_large(read(&bytes));
+    assert_eq!(read(&mat_5(&[folded_struct(3)])).unwrap().t_s, [0.0]);
 }
 
 #[test]

@@ -303,8 +303,7 @@ fn numbers_without_a_header_are_refused() {
 
 #[test]
 fn other_kinds_of_file_are_refused_by_their_name() {
-    for (bytes, kind) in [(&b"\xff\xfet\0"[..], "UTF-16"), (b"\x1f\x8b\x08\0", "gzip"), (b"PK\x03\x04", "spreadsheet")]
-    {
+    for (bytes, kind) in [(&b"\xff\xfet\0"[..], "UTF-16"), (b"PK\x03\x04", "spreadsheet")] {
         assert!(refusal(bytes).contains(kind), "{kind}");
     }
     assert!(refusal("t_s,xc_v,yc_v\r0,1,0\r").contains("carriage returns"));

@@ -91,14 +91,33 @@ fn a_mapped_column_that_is_not_there_is_named_with_those_that_are() {
     assert!(error.contains("`temp_c` is mapped to a column `Ch9`") && error.contains("`Note`"), "{error}");
 }
 
+fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut out = [kind.to_le_bytes(), u32::try_from(bytes.len()).unwrap().to_le_bytes()].concat();
+    out.extend_from_slice(bytes);
+    out.resize(out.len().next_multiple_of(8), 0);
+    out
+}
+
+/// A struct of a MATLAB 5 file: names of eight letters at most, with as many entries of arrays as are given.
+fn structure(name: &str, names: &[&str], arrays: &[Vec<u8>]) -> Vec<u8> {
+    let flags = [2u32.to_le_bytes(), 0u32.to_le_bytes()].concat();
+    let size = [1u32.to_le_bytes(), u32::try_from(arrays.len() / names.len()).unwrap().to_le_bytes()].concat();
+    let names: Vec<u8> = names.iter().flat_map(|name| format!("{name:\0<9}").into_bytes()).collect();
+    // the width of a name is a small element: four bytes within the tag
+    let width = [(4u32 << 16 | 5).to_le_bytes(), 9u32.to_le_bytes()].concat();
+    let parts = [
+        element(6, &flags),
+        element(5, &size),
+        element(1, name.as_bytes()),
+        width,
+        element(1, &names),
+        arrays.concat(),
+    ];
+    element(14, &parts.concat())
+}
+
 /// One array of a MATLAB 5 file: real doubles, column by column.
 fn matrix(name: &str, size: [u32; 2], values: &[f64]) -> Vec<u8> {
-    let element = |kind: u32, bytes: &[u8]| {
-        let mut out = [kind.to_le_bytes(), u32::try_from(bytes.len()).unwrap().to_le_bytes()].concat();
-        out.extend_from_slice(bytes);
-        out.resize(out.len().next_multiple_of(8), 0);
-        out
-    };
     let flags = [6u32.to_le_bytes(), 0u32.to_le_bytes()].concat();
     let size = size.map(u32::to_le_bytes).concat();
     let values: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -132,6 +151,36 @@ fn a_matlab_file_is_read_by_its_arrays() {
     assert_eq!(Recording::read_named(file.path(), &mapped).unwrap().t_s, recording.t_s);
 }
 
+#[test]
+fn the_fields_of_a_matlab_struct_are_columns() {
+    let column = |values: &[f64]| matrix("", [3, 1], values);
+    let run = structure(
+        "run1",
+        &["t_s", "iq", "temp_c"],
+        &[column(&[0.0, 0.1, 0.2]), matrix("", [3, 2], &[1.0, 0.9, 0.8, 0.0, 0.1, 0.2]), column(&[25.0, 25.5, 26.0])],
+    );
+    let meta = structure("meta", &["temp_c", "rate"], &[matrix("", [1, 1], &[25.0]), matrix("", [1, 1], &[5.0])]);
+    let bytes = mat_5(&[meta, run, matrix("table_deg", [3, 1], &[0.0, 1.0, 2.0])]);
+    let mapped = naming(&["xc_v=iq(:,1)", "yc_v=iq(:,2)", "temp_c=run1.temp_c"]);
+    let recording = Recording::read_from(bytes.as_slice(), &mapped, Path::new("a.mat")).unwrap();
+    assert_eq!(recording.yc_v.as_deref(), Some(&[0.0, 0.1, 0.2][..]));
+    assert_eq!(recording.temp_c.as_deref(), Some(&[25.0, 25.5, 26.0][..]));
+    assert_eq!(recording.table_deg.as_deref(), Some(&[0.0, 1.0, 2.0][..]));
+    assert!(
+        recording.warnings.iter().any(|w| w.contains("`rate` has 1 values, the time 3")),
+        "{:?}",
+        recording.warnings
+    );
+}
+
+#[test]
+fn a_struct_of_several_entries_is_left_alone() {
+    let column = || matrix("", [3, 1], &[0.0, 0.1, 0.2]);
+    let bytes = mat_5(&[structure("runs", &["t_s", "theta_deg"], &[column(), column(), column(), column()])]);
+    let said = Recording::read_from(bytes.as_slice(), Naming::NONE, Path::new("a.mat")).unwrap_err().to_string();
+    assert!(said.contains("there are no columns"), "{said}");
+}
+
 fn hdf5() -> Vec<u8> {
     let mut file = hdf5_pure::FileBuilder::new();
     file.create_dataset("t_s").with_f64_data(&[0.0, 0.1, 0.2]);
@@ -150,7 +199,8 @@ fn an_hdf5_file_is_read_by_its_datasets() {
 
 #[test]
 fn damaged_containers_are_refused_with_their_name() {
-    for bytes in [hdf5(), mat_5(&[matrix("t_s", [3, 1], &[0.0, 0.1, 0.2])])] {
+    let times = || matrix("t_s", [3, 1], &[0.0, 0.1, 0.2]);
+    for bytes in [hdf5(), mat_5(&[times()]), mat_5(&[structure("s", &["t_s", "x"], &[times(), times()])])] {
         for cut in (16..bytes.len()).step_by(7) {
             let read = Recording::read_from(&bytes[..cut], Naming::NONE, Path::new("cut.bin"));
             assert!(read.is_err_and(|e| e.to_string().starts_with("cut.bin: ")), "cut at {cut}");

@@ -25,7 +25,7 @@ struct Listed {
 pub(super) fn read(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let damaged = || refuse(source, KIND, "the file is damaged".to_owned());
     let arrays = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
-    admission::admit(table(arrays, naming, source)?, source)
+    admission::admit(table(arrays, naming, source)?, naming, source)
 }
 
 fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Vec<Named>, ReadError> {

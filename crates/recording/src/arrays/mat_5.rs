@@ -9,13 +9,14 @@ use matfile::{MatFile, NumericData};
 use crate::Recording;
 use crate::admission;
 use crate::arrays::columns::{push, refuse, table};
+use crate::arrays::structs;
 use crate::error::ReadError;
 use crate::memory::{self, PER_NUMBER};
 use crate::naming::Naming;
 
 /// Reads a recording from the bytes of a `.mat` file of version 5.
 pub(super) fn read(bytes: &[u8], naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
-    let unfolded = unfolded(bytes, source)?;
+    let unfolded = structs::flattened(unfolded(bytes, source)?);
     // the decoder is not proof against every damaged file
     let decoded = memory::guarded(|| MatFile::parse(unfolded.as_slice()).map_err(|e| e.to_string()));
     let file = decoded.unwrap_or_else(|| Err("the file is damaged".into()));
@@ -25,7 +26,7 @@ pub(super) fn read(bytes: &[u8], naming: &Naming, source: &Path) -> Result<Recor
     for array in file.arrays() {
         push(&mut arrays, array.name(), array.size(), real(array.data()), true);
     }
-    admission::admit(table(arrays, naming, source)?, source)
+    admission::admit(table(arrays, naming, source)?, naming, source)
 }
 
 const KIND: &str = "a MATLAB file";
@@ -33,6 +34,8 @@ const KIND: &str = "a MATLAB file";
 const HEADER: usize = 128;
 /// Type of an element that is compressed.
 const COMPRESSED: u32 = 15;
+/// Where an array's flags stand in it: after its own tag and theirs.
+const FLAGS_AT: usize = 8 + 8;
 /// Where an array's size stands in it: after its own tag, its flags and the tag of the size.
 const SIZE_AT: usize = 8 + 16;
 
@@ -73,7 +76,10 @@ fn unfolded(bytes: &[u8], source: &Path) -> Result<Vec<u8>, ReadError> {
         let dimensions = word(array, SIZE_AT + 4).unwrap_or(0) as usize / 4;
         let sizes =
             (0..dimensions.min(array.len() / 4)).map(|d| u64::from(word(array, SIZE_AT + 8 + 4 * d).unwrap_or(0)));
-        let values = sizes.fold(1_u64, u64::saturating_mul).min(array.len() as u64);
+        // a struct says how many structs it is; of the numbers in it, a byte each is the least
+        let is_struct = word(array, FLAGS_AT).is_some_and(|flags| flags & 0xff == structs::STRUCT);
+        let values = if is_struct { u64::MAX } else { sizes.fold(1_u64, u64::saturating_mul) };
+        let values = values.min(array.len() as u64);
         needed = needed.saturating_add(2 * array.len() as u64).saturating_add(values.saturating_mul(PER_NUMBER));
         memory::allow(needed, "its arrays", source)?;
     }

@@ -1,8 +1,8 @@
 //! Recordings in containers of arrays: MATLAB's `.mat` (version 5, and 7.3 as HDF5) and HDF5.
 //!
 //! A column is an array of one value a row; of a matrix, each column is one, named `name(:,1)` as MATLAB does. Arrays of
-//! another length than the time's are left out with a warning. Groups of an HDF5 file are looked through; a column keeps
-//! the last part of its path as its name where no other has it.
+//! another length than the time's are left out with a warning. Groups of an HDF5 file and fields of a MATLAB
+//! struct are looked through; a column keeps the last part of its path as its name where no other has it.
 
 #[cfg(any(feature = "hdf5", feature = "matlab"))]
 mod columns;
@@ -10,6 +10,8 @@ mod columns;
 mod hdf5;
 #[cfg(feature = "matlab")]
 mod mat_5;
+#[cfg(feature = "matlab")]
+mod structs;
 
 use std::path::Path;
 

@@ -4,13 +4,16 @@
 //! appended. From the first block on that has a quote, records are read one by one, exactly.
 
 mod assembly;
+mod beneath;
 mod blocks;
 mod cell;
 mod digits;
 mod head;
 mod piece;
 mod plain;
+mod preamble;
 mod record;
+mod stamp;
 mod write;
 
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -20,12 +23,15 @@ use rayon::prelude::*;
 
 use self::assembly::Assembly;
 use self::blocks::{Block, BlockError, Blocks, LONGEST_LINE};
-use self::cell::Decimal;
+use self::cell::{Cell, Decimal};
 use self::piece::{Dialect, Piece};
 use self::record::{Record, RecordError, Records};
+use self::stamp::Stamp;
 use super::Recording;
 use super::admission;
+use super::channel::Channel;
 use super::error::ReadError;
+use super::layout::Field;
 use super::naming::Naming;
 use super::table::Table;
 
@@ -49,7 +55,7 @@ pub(super) fn read(
     naming: &Naming,
     source: &Path,
 ) -> Result<Recording, ReadError> {
-    admission::admit(read_table(reader, size, naming, source, SIZES)?, source)
+    admission::admit(read_table(reader, size, naming, source, SIZES)?, naming, source)
 }
 
 /// A block and the pieces it is cut into.
@@ -98,12 +104,27 @@ fn read_table(
     let mut reader = BufReader::new(reader);
     let mut head = head::read(&mut reader, naming, source)?;
     let mut blocks = Blocks::new(Cursor::new(std::mem::take(&mut head.read_ahead)).chain(reader), sizes.block);
-    let mut dialect = Dialect { layout: &head.layout, separator: head.separator, decimal: Decimal::Point };
+    let mut dialect = Dialect { layout: &head.layout, separator: head.separator, decimal: Decimal::Point, first: None };
 
     let [mut previous, mut current, mut next] = [(); 3].map(|()| Batch::default());
     let mut is_filled = current.fill(&mut blocks).map_err(|error| refuse_block(error, source, head.next_line))?;
     if let Some(decimal) = decimal_mark(&dialect, current.block.lines()) {
         dialect.decimal = decimal;
+    }
+    dialect.first = first_stamp(&dialect, current.block.lines());
+    if dialect.first.is_some() {
+        let units = &mut head.units;
+        units.retain(|(channel, _)| *channel != Channel::Time);
+        units.push((Channel::Time, "s".to_owned()));
+        if naming.factor(Channel::Time).is_some_and(|factor| factor != 1.0) {
+            return Err(ReadError::Header {
+                path: source.to_path_buf(),
+                line: head.header_line,
+                what: "the times below it are dates, and the mapping of `t_s` has a factor".to_owned(),
+                wanted: "the mapping without a factor",
+            });
+        }
+        head.warnings.push("times are written as dates: `t_s` is counted from the first, in s".to_owned());
     }
     let mut assembly = Assembly::new(dialect, source, head.header_line, head.next_line);
     let mut bytes_parsed = 0;
@@ -132,7 +153,9 @@ fn read_table(
         let text = Cursor::new(current.block.lines_as_read()).chain(Cursor::new(carry)).chain(BufReader::new(rest));
         read_records(text, &dialect, &mut assembly, source, sizes)?;
     }
-    Ok(assembly.finish())
+    let mut table = assembly.finish();
+    (table.units, table.warnings) = (head.units.clone(), head.warnings.clone());
+    Ok(table)
 }
 
 /// Makes room for the rows of a whole file, told by its first block.
@@ -154,6 +177,22 @@ fn decimal_mark(dialect: &Dialect<'_>, lines: &[u8]) -> Option<Decimal> {
         let mark = plain::decimal_mark(dialect, record.fields());
         if mark.is_some() {
             return mark;
+        }
+    }
+    None
+}
+
+/// The first time of a text, where it is a date.
+fn first_stamp(dialect: &Dialect<'_>, lines: &[u8]) -> Option<Stamp> {
+    let is_time = |field: &Field| matches!(*field, Field::Number(at) if dialect.layout.channels[at] == Channel::Time);
+    let column = dialect.layout.fields.iter().position(is_time)?;
+    let mut records = Records::new(lines, dialect.separator, 1);
+    let mut record = Record::default();
+    while records.read(&mut record).ok()? {
+        let cell = record.fields().nth(column).map(|cell| (cell, cell::read(cell, dialect.decimal)));
+        match cell.filter(|_| !record.is_blank && !plain::is_comment(dialect, record.fields().next())) {
+            None | Some((_, Cell::Missing)) => {}
+            Some((cell, _)) => return Stamp::of(cell),
         }
     }
     None

@@ -4,6 +4,8 @@
 //! row that is too short is held back here and judged in `assembly.rs`.
 
 use super::cell::{self, Cell, Decimal};
+use super::stamp::Stamp;
+use crate::channel::Channel;
 use crate::layout::{Field, Layout};
 use crate::table::Missing;
 use crate::unknown::Cells;
@@ -14,6 +16,29 @@ pub(super) struct Dialect<'a> {
     pub(super) layout: &'a Layout,
     pub(super) separator: u8,
     pub(super) decimal: Decimal,
+    /// The first time, where times are written as dates.
+    pub(super) first: Option<Stamp>,
+}
+
+impl Dialect<'_> {
+    /// A cell of a channel, by its place in the layout; where it is neither a number nor missing, what it should be.
+    fn cell(&self, at: usize, content: &[u8]) -> Result<Option<f64>, &'static str> {
+        let is_time = self.layout.channels.get(at) == Some(&Channel::Time);
+        let read = match self.first.filter(|_| is_time).map(|first| first.seconds_to(content)) {
+            Some(Some(seconds)) => Cell::Number(seconds),
+            Some(None) if !matches!(cell::read(content, self.decimal), Cell::Missing) => Cell::Text,
+            _ => cell::read(content, self.decimal),
+        };
+        match read {
+            Cell::Number(value) => Ok(Some(value)),
+            Cell::Missing => Ok(None),
+            Cell::Text if is_time && self.first.is_some() => {
+                Err("a date with a time of day as the first, all with an offset from UTC or none")
+            }
+            Cell::Text if is_time => Err("a number of seconds, or a date such as 2026-03-01T12:00:00.25Z"),
+            Cell::Text => Err(self.decimal.wanted()),
+        }
+    }
 }
 
 /// What is wrong with a row.
@@ -108,7 +133,10 @@ impl Piece {
             self.fault = Some(Fault::FieldCount { line: short.line, found: short.fields });
             return;
         }
-        let (found, expected) = (fields.clone().count(), dialect.layout.fields.len());
+        let (mut found, expected) = (fields.clone().count(), dialect.layout.fields.len());
+        let padding: &[&[u8]] = if dialect.layout.is_last_optional && found + 1 == expected { &[b""] } else { &[] };
+        let fields = fields.chain(padding.iter().copied());
+        found += padding.len();
         if found < expected {
             self.short = Some(Short { line, fields: found });
             return;
@@ -117,7 +145,7 @@ impl Piece {
             self.fault = Some(Fault::FieldCount { line, found });
             return;
         }
-        if !is_terminated && fields.clone().last().is_some_and(|last| is_cut_off(dialect, last)) {
+        if !is_terminated && padding.is_empty() && fields.clone().last().is_some_and(|last| is_cut_off(dialect, last)) {
             self.short = Some(Short { line, fields: found });
             return;
         }
@@ -125,12 +153,12 @@ impl Piece {
         for (column, (field, content)) in dialect.layout.fields.iter().zip(fields).enumerate() {
             let refused = match *field {
                 Field::Number(at) => {
-                    let read = cell::read(content, dialect.decimal);
-                    self.values[at * self.stride + row] = if let Cell::Number(value) = read { value } else { f64::NAN };
-                    if read == Cell::Missing {
+                    let read = dialect.cell(at, content);
+                    self.values[at * self.stride + row] = read.ok().flatten().unwrap_or(f64::NAN);
+                    if read == Ok(None) {
                         self.missing[at].add(row);
                     }
-                    (read == Cell::Text).then_some(dialect.decimal.wanted())
+                    read.err()
                 }
                 Field::Text(at) => match std::str::from_utf8(content) {
                     Ok(text) => {
@@ -156,7 +184,7 @@ impl Piece {
 /// Whether the last field of a line without an end is one that was cut off: nothing, or not yet a number.
 fn is_cut_off(dialect: &Dialect<'_>, last: &[u8]) -> bool {
     match dialect.layout.fields.last() {
-        Some(Field::Number(_)) => !matches!(cell::read(last, dialect.decimal), Cell::Number(_)),
+        Some(Field::Number(at)) => !matches!(dialect.cell(*at, last), Ok(Some(_))),
         _ => last.is_empty(),
     }
 }

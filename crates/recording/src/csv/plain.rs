@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::cell::{self, Decimal};
 use super::digits::plain_number;
 use super::piece::{Dialect, Piece};
+use super::stamp::Stamp;
 use crate::layout::Field;
 
 /// Reads the whole lines of `text[range]` into a piece. What is behind the range is looked at and not used.
@@ -19,7 +20,8 @@ pub(super) fn read(dialect: &Dialect<'_>, text: &[u8], range: Range<usize>, is_t
     while at < end && piece.fault.is_none() {
         let line = piece.lines;
         let ends_text = |next: usize| next >= end && !is_terminated;
-        let plain = if piece.short.is_none() { plain_row(dialect, text, at, end, piece) } else { None };
+        let may_be_plain = piece.short.is_none() && dialect.first.is_none();
+        let plain = if may_be_plain { plain_row(dialect, text, at, end, piece) } else { None };
         if let Some(next) = plain.filter(|&next| !ends_text(next)) {
             piece.commit(line);
             at = next;
@@ -112,10 +114,9 @@ pub(super) fn is_comment(dialect: &Dialect<'_>, first: Option<&[u8]>) -> bool {
 
 /// The decimal mark of a row, if the row tells it: the first mark in a cell of numbers.
 pub(super) fn decimal_mark<'f>(dialect: &Dialect<'_>, fields: impl Iterator<Item = &'f [u8]>) -> Option<Decimal> {
-    dialect.layout.fields.iter().zip(fields).filter(|(field, _)| matches!(field, Field::Number(_))).find_map(
-        |(_, cell)| {
-            let mark = cell.iter().find(|byte| matches!(byte, b'.' | b','))?;
-            Some(if *mark == b',' { Decimal::Comma } else { Decimal::Point })
-        },
-    )
+    let is_number = |field: &Field, cell: &[u8]| matches!(field, Field::Number(_)) && Stamp::of(cell).is_none();
+    dialect.layout.fields.iter().zip(fields).filter(|(field, cell)| is_number(field, cell)).find_map(|(_, cell)| {
+        let mark = cell.iter().find(|byte| matches!(byte, b'.' | b','))?;
+        Some(if *mark == b',' { Decimal::Comma } else { Decimal::Point })
+    })
 }

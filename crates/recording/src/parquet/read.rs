@@ -29,7 +29,7 @@ pub(crate) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recordi
     // The decoder asserts what a damaged file does not hold.
     let decoded = memory::guarded(|| decode(file, naming, source));
     let damaged = || ReadError::Parquet { path: source.to_path_buf(), what: "the file is damaged".to_owned() };
-    admission::admit(decoded.ok_or_else(damaged)??, source)
+    admission::admit(decoded.ok_or_else(damaged)??, naming, source)
 }
 
 fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError> {

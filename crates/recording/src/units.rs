@@ -1,0 +1,181 @@
+//! Units as people write them beside their columns, and what takes them to the unit of a channel.
+//!
+//! A unit stands in a row below the header, or in brackets at the end of a mapped name: `Time (ms)`. Nothing that is
+//! written is passed over: it is the channel's unit, becomes a conversion that is said, or is refused. A factor in the
+//! mapping stands over all of it.
+
+use super::channel::Channel;
+
+/// What takes a value to the unit of its channel: value · factor + offset.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Conversion {
+    pub(crate) factor: f64,
+    pub(crate) offset: f64,
+}
+
+impl Conversion {
+    /// The unit is the channel's.
+    pub(crate) const NONE: Self = Self::by(1.0);
+
+    /// A factor alone.
+    pub(crate) const fn by(factor: f64) -> Self {
+        Self { factor, offset: 0.0 }
+    }
+
+    pub(crate) fn of(self, value: f64) -> f64 {
+        if self.offset == 0.0 { value * self.factor } else { value * self.factor + self.offset }
+    }
+}
+
+/// 0 °C, K.
+const ICE_K: f64 = 273.15;
+const RADIAN_DEG: f64 = 180.0 / std::f64::consts::PI;
+
+/// The conversion of a unit to a channel's; `None` where it is not known to be one of this kind.
+pub(crate) fn conversion(channel: Channel, unit: &str) -> Option<Conversion> {
+    let unit = plain(unit);
+    match channel {
+        Channel::Time => time_s(&unit).map(Conversion::by),
+        Channel::Table | Channel::Theta => angle_deg(&unit).map(Conversion::by),
+        Channel::Rate => rate_dps(&unit).map(Conversion::by),
+        Channel::Temperature => match unit.as_str() {
+            "°c" | "c" | "degc" | "celsius" => Some(Conversion::NONE),
+            "k" | "kelvin" => Some(Conversion { factor: 1.0, offset: -ICE_K }),
+            _ => None,
+        },
+        // displacements are in any unit
+        Channel::X | Channel::Y => Some(Conversion::NONE),
+        _ => voltage_v(&unit).map(Conversion::by),
+    }
+}
+
+/// The unit of a channel in words.
+pub(crate) const fn of_channel(channel: Channel) -> &'static str {
+    match channel {
+        Channel::Time => "s",
+        Channel::Table | Channel::Theta => "deg",
+        Channel::Rate => "deg/s",
+        Channel::Temperature => "°C",
+        Channel::X | Channel::Y => "any unit",
+        _ => "V",
+    }
+}
+
+/// What stands in brackets at the end of a name: `Time (ms)`, `Rate [rad/s]`.
+pub(crate) fn in_brackets(name: &str) -> Option<&str> {
+    let name = name.trim_end();
+    let open = match name.chars().next_back()? {
+        ')' => '(',
+        ']' => '[',
+        _ => return None,
+    };
+    let unit = name[..name.len() - 1].rsplit_once(open)?.1.trim();
+    (!unit.is_empty()).then_some(unit)
+}
+
+/// A unit without the brackets around it.
+pub(crate) fn bare(unit: &str) -> &str {
+    unit.trim().trim_matches(['(', ')', '[', ']', '<', '>']).trim()
+}
+
+/// A unit in small letters without brackets, blanks and the signs that have two forms.
+fn plain(unit: &str) -> String {
+    let one = |c: char| match c {
+        'µ' | 'μ' => 'u',
+        'º' => '°',
+        c => c,
+    };
+    bare(unit).chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).map(one).collect()
+}
+
+fn time_s(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+        "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+        "us" | "usec" | "microsecond" | "microseconds" => 1e-6,
+        "ns" | "nanosecond" | "nanoseconds" => 1e-9,
+        "min" | "minute" | "minutes" => 60.0,
+        "h" | "hr" | "hour" | "hours" => 3600.0,
+        _ => return None,
+    })
+}
+
+fn angle_deg(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "deg" | "degree" | "degrees" | "°" => 1.0,
+        "mdeg" => 1e-3,
+        "rad" | "radian" | "radians" => RADIAN_DEG,
+        "mrad" => 1e-3 * RADIAN_DEG,
+        "urad" => 1e-6 * RADIAN_DEG,
+        "arcmin" => 1.0 / 60.0,
+        "arcsec" => 1.0 / 3600.0,
+        "rev" | "revs" | "revolution" | "revolutions" | "turn" | "turns" => 360.0,
+        "gon" | "grad" => 0.9,
+        _ => return None,
+    })
+}
+
+/// An angle over a time, and the rates that have a name of their own.
+fn rate_dps(unit: &str) -> Option<f64> {
+    if let Some((angle, time)) = unit.split_once('/') {
+        return Some(angle_deg(angle)? / time_s(time)?);
+    }
+    Some(match unit {
+        "dps" => 1.0,
+        "mdps" => 1e-3,
+        "dph" => 1.0 / 3600.0,
+        "rpm" => 6.0,
+        "rps" => 360.0,
+        _ => return None,
+    })
+}
+
+fn voltage_v(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "v" | "volt" | "volts" => 1.0,
+        "mv" | "millivolt" | "millivolts" => 1e-3,
+        "uv" | "microvolt" | "microvolts" => 1e-6,
+        "nv" => 1e-9,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_taken_to_those_of_their_channels() {
+        for (channel, unit, one) in [
+            (Channel::Time, "[ms]", 1e-3),
+            (Channel::Time, "µs", 1e-6),
+            (Channel::Time, "Seconds", 1.0),
+            (Channel::Table, "rad", 180.0 / std::f64::consts::PI),
+            (Channel::Theta, "°", 1.0),
+            (Channel::Rate, "(rad / s)", 180.0 / std::f64::consts::PI),
+            (Channel::Rate, "RPM", 6.0),
+            (Channel::Rate, "rev/min", 6.0),
+            (Channel::Rate, "°/h", 1.0 / 3600.0),
+            (Channel::Xc, "mV", 1e-3),
+            (Channel::Temperature, "K", 1.0 - 273.15),
+            (Channel::X, "furlongs", 1.0),
+        ] {
+            let found = conversion(channel, unit).map(|c| c.of(1.0));
+            assert_eq!(found, Some(one), "{channel} in {unit}");
+        }
+        for (channel, unit) in
+            [(Channel::Time, "V"), (Channel::Rate, "rad"), (Channel::Xc, "counts"), (Channel::Table, "m")]
+        {
+            assert_eq!(conversion(channel, unit), None, "{channel} in {unit}");
+        }
+    }
+
+    #[test]
+    fn a_unit_in_brackets_ends_a_name() {
+        assert_eq!(in_brackets("Time (ms)"), Some("ms"));
+        assert_eq!(in_brackets("Rate [rad/s] "), Some("rad/s"));
+        for name in ["Time", "(ms) Time", "Time ()", "ms)"] {
+            assert_eq!(in_brackets(name), None, "{name}");
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! What instruments write around their numbers: dates in the place of seconds, rows of units, and lines about themselves.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use cvg_recording::{Naming, ReadError, Recording};
+
+fn read(text: &str, entries: &[&str]) -> Result<Recording, ReadError> {
+    let mut naming = Naming::default();
+    entries.iter().for_each(|e| naming.add(e).unwrap());
+    Recording::read_from(text.as_bytes(), &naming, Path::new("bench.csv"))
+}
+
+fn refusal(text: &str, entries: &[&str]) -> String {
+    read(text, entries).expect_err("it is refused").to_string()
+}
+
+fn assert_warns(recording: &Recording, of: &str) {
+    assert!(recording.warnings.iter().any(|warning| warning.contains(of)), "{of:?} in {:?}", recording.warnings);
+}
+
+#[test]
+fn dates_are_times_counted_from_the_first() {
+    let text = "When;xc_v;yc_v\n2026-03-01T12:00:00.000000001+01:00;1,5;0\n2026-03-01T11:00:00.250000001Z;0,5;1\n";
+    let recording = read(text, &["t_s=When"]).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.25]);
+    assert_eq!(recording.xc_v.as_deref(), Some(&[1.5, 0.5][..]), "the point in a date is no decimal mark");
+    assert_warns(&recording, "`t_s` is counted from the first");
+    let quoted = "t_s,xc_v,yc_v\n\"2026-03-01 12:00:00,5\",1,0\n2026-03-01 12:00:01.5,0,1\n";
+    assert_eq!(read(quoted, &[]).unwrap().t_s, [0.0, 1.0]);
+}
+
+#[test]
+fn dates_that_cannot_be_counted_are_refused_with_their_line() {
+    let row = |second: &str| format!("t_s,xc_v,yc_v\n2026-03-01T12:00:01Z,1,0\n{second},0,1\n");
+    assert!(refusal(&row("2026-03-01T12:00:00Z"), &[]).contains("line 3: the time goes back from 0 s to -1 s"));
+    for other in ["2026-03-01T12:00:02", "2.5", "2026-02-30T12:00:00Z"] {
+        let said = refusal(&row(other), &[]);
+        assert!(said.contains("line 3, column 1 (`t_s`)") && said.contains("a date with a time of day"), "{said}");
+    }
+    let said = refusal("t_s,xc_v,yc_v\n01.03.2026 12:00:01,1,0\n", &[]);
+    assert!(said.contains("not a number of seconds, or a date such as 2026-03-01T12:00:00.25Z"), "{said}");
+    let said = refusal(&row("2026-03-01T12:00:02Z").replace("t_s", "Time"), &["t_s=Time*0.001"]);
+    assert!(said.contains("the mapping without a factor"), "{said}");
+}
+
+#[test]
+fn a_date_that_is_missing_drops_its_row() {
+    let text = "t_s,xc_v,yc_v\n,9,9\n2026-03-01T12:00:01Z,1,0\n,2,2\n2026-03-01T12:00:02Z,0,1\n";
+    let recording = read(text, &[]).unwrap();
+    assert_eq!((recording.t_s.as_slice(), recording.dropped.empty_or_nan.count), (&[0.0, 1.0][..], 2));
+}
+
+#[test]
+fn a_row_of_units_is_a_conversion_that_is_said() {
+    for units in ["ms,rad/s,mV,mV", "[ms],[rad/s],[mV],[mV]", "# ms, rad/s, mV, mV"] {
+        let recording = read(&format!("t_s,rate_dps,xc_v,yc_v\n{units}\n0,1,1000,0\n10,1,0,1000\n"), &[]).unwrap();
+        assert_eq!(recording.t_s, [0.0, 0.01], "{units}");
+        assert_eq!(recording.rate_dps.as_deref(), Some(&[180.0 / std::f64::consts::PI; 2][..]), "{units}");
+        assert_eq!(recording.yc_v.as_deref(), Some(&[0.0, 1.0][..]), "{units}");
+        assert_warns(&recording, "`rate_dps` is in rad/s and taken to deg/s");
+        assert_warns(&recording, "`t_s` is in ms and taken to s");
+    }
+}
+
+#[test]
+fn units_that_are_ours_change_nothing_and_rows_keep_their_lines() {
+    let text = "t_s,table_deg,xc_v,yc_v,note\ns,deg,V,V,-\n0,0,1,0,a\n1,10,x,1,b\n";
+    let said = refusal(text, &[]);
+    assert!(said.contains("line 4, column 3 (`xc_v`): \"x\" is not a number"), "{said}");
+    let recording = read(&text.replace('x', "0").replace("0c_v", "xc_v"), &[]).unwrap();
+    assert_eq!(recording.table_deg.as_deref(), Some(&[0.0, 10.0][..]));
+    assert_eq!(recording.unknown[0].cells.iter().collect::<Vec<_>>(), ["a", "b"]);
+    assert_eq!(recording.warnings, ["bench.csv: unknown columns, kept and not used: `note`"]);
+}
+
+#[test]
+fn a_unit_that_is_not_known_is_refused_with_the_next_step() {
+    let text = "Clock,Pos,xc_v,yc_v\nticks,deg,V,V\n0,0,1,0\n10,1,0,1\n";
+    let said = refusal(text, &["t_s=Clock", "table_deg=Pos"]);
+    assert!(said.contains("`t_s` is in \"ticks\"; wanted s") && said.contains("--map 't_s=Clock*FACTOR'"), "{said}");
+    let recording = read(text, &["t_s=Clock*0.001", "table_deg=Pos"]).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.01]);
+    assert_warns(&recording, "`t_s` is said to be in ticks; the factor 0.001 of the mapping is taken");
+}
+
+#[test]
+fn a_factor_stands_over_the_unit_it_agrees_with() {
+    let recording = read("Clock,xc_v,yc_v\nms,V,V\n0,1,0\n10,0,1\n", &["t_s=Clock/1000"]).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.01]);
+    assert!(recording.warnings.is_empty(), "{:?}", recording.warnings);
+}
+
+#[test]
+fn channels_in_counts_or_in_a_field_are_kept_in_it_together() {
+    let recording = read("t_s,xc_v,yc_v\ns,counts,counts\n0,100,0\n1,0,100\n", &[]).unwrap();
+    assert_eq!(recording.xc_v.as_deref(), Some(&[100.0, 0.0][..]));
+    assert_warns(&recording, "`xc_v` is in counts and kept in it");
+    let said = refusal("t_s,xc_v,yc_v\ns,uT,mT\n0,100,0\n1,0,100\n", &[]);
+    assert!(said.contains("`xc_v` is in \"uT\"; wanted V"), "{said}");
+}
+
+#[test]
+fn a_unit_in_the_brackets_of_a_mapped_name_is_a_conversion_too() {
+    let text = "Time (ms),Pos [rad],A (left),B\n0,0,1,0\n10,1,0,1\n";
+    let recording = read(text, &["t_s=Time (ms)", "table_deg=Pos [rad]", "xc_v=A (left)", "yc_v=B"]).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.01]);
+    assert_eq!(recording.table_deg.as_deref(), Some(&[0.0, 180.0 / std::f64::consts::PI][..]));
+    assert_eq!(recording.xc_v.as_deref(), Some(&[1.0, 0.0][..]));
+    assert_warns(&recording, "`table_deg` is in rad and taken to deg");
+    let kept = read(text, &["t_s=Time (ms)*1", "table_deg=Pos [rad]", "xc_v=A (left)", "yc_v=B"]).unwrap();
+    assert_eq!(kept.t_s, [0.0, 10.0], "a factor of 1 keeps it");
+}
+
+#[test]
+fn a_row_of_words_without_one_number_is_no_row_of_units_where_a_number_stands_in_it() {
+    let said = refusal("t_s,xc_v,yc_v\n0,OVER,OVER\n1,1,0\n", &[]);
+    assert!(said.contains("line 2, column 2 (`xc_v`): \"OVER\" is not a number"), "{said}");
+}
+
+const LABVIEW: &str = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tOne\n\
+    Date\t2026/03/01\nTime\t12:00:00,5\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t3\t3\t\n\
+    Y_Unit_Label\tMillivolts\tMillivolts\t\nX_Dimension\tTime\tTime\t\nX0\t0,0E+0\t0,0E+0\t\nDelta_X\t0,100000\t0,100000\t\n\
+    ***End_of_Header***\t\t\t\nX_Value\tSin\tCos\tComment\n0,000000\t1000,0\t0,0\tstart\n0,100000\t500,0\t600,0\n0,200000\t0,0\t1000,0\n";
+
+#[test]
+fn a_labview_file_is_read_below_what_it_says_of_itself() {
+    for text in [LABVIEW.to_owned(), LABVIEW.replace('\n', "\r\n")] {
+        let recording = read(&text, &["t_s=X_Value", "xc_v=Sin", "yc_v=Cos"]).unwrap();
+        assert_eq!(recording.t_s, [0.0, 0.1, 0.2]);
+        assert_eq!(recording.xc_v.as_deref(), Some(&[1.0, 0.5, 0.0][..]));
+        assert_warns(&recording, "lines 1 to 16, above the header, are passed over");
+        assert_warns(&recording, "`xc_v` is in Millivolts and taken to V");
+        assert_eq!(recording.unknown[0].cells.iter().collect::<Vec<_>>(), ["start", "", ""]);
+    }
+}
+
+#[test]
+fn lines_of_text_above_the_header_are_passed_over_and_said() {
+    let text = "Bench 3, operator X\nSample rate;100 Hz\n\nt_s;xc_v;yc_v\n0;1,5;0\n1;0;x\n";
+    let said = refusal(text, &[]);
+    assert!(said.contains("line 6, column 3 (`yc_v`): \"x\""), "{said}");
+    let recording = read(&text.replace('x', "1").replace("1c_v", "xc_v"), &[]).unwrap();
+    assert_eq!(recording.xc_v.as_deref(), Some(&[1.5, 0.0][..]));
+    assert_warns(&recording, "lines 1 to 3, above the header, are passed over");
+}
+
+#[test]
+fn a_file_without_our_names_is_refused_with_the_names_above_its_numbers() {
+    for text in ["Bench 3\nRun;5\n\nClock;A;B\nms;V;V\n0;1,5;0\n10;0;1\n", "Clock;A;B\n0;1;0\n", LABVIEW] {
+        let said = refusal(text, &[]);
+        let names = if text == LABVIEW { "`X_Value`, `Sin`, `Cos`" } else { "`Clock`, `A`, `B`" };
+        assert!(said.contains(&format!("there are {names}")), "{said}");
+    }
+}
