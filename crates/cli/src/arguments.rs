@@ -40,7 +40,7 @@ Examples:
   cvg identify export.csv --map 't_s=Time (ms)*0.001' --map xc_v=Ch1 --map yc_v=Ch2 --map table_deg=Pos
   cvg identify campaign.toml --limits limits.toml  pass or fail on numbers of the report
   cvg identify campaign.toml --effect my-effect.toml  an effect of your own competes with the library's
-  gunzip -c rot.csv.gz | cvg identify - --json";
+  cvg identify rot.csv.gz --json";
 
 const INSPECT: &str = "\
 Examples:

@@ -54,6 +54,8 @@ fn targets(files: &[PathBuf], out: &Path) -> Result<Vec<PathBuf>, Failure> {
             let name = file.file_name().filter(|_| file.as_os_str() != "-");
             let name = name.ok_or_else(|| Failure::input(format!("{}: has no name to keep", file.display())))?;
             let name = Path::new(name);
+            let packed = name.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+            let name = Path::new(name.file_stem().filter(|_| packed).unwrap_or(name.as_os_str()));
             let tabular = name.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
             Ok(out.join(if tabular { name.to_owned() } else { name.with_extension("csv") }))
         })

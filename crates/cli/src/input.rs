@@ -39,8 +39,9 @@ pub(crate) fn foreign_columns(path: &Path, error: &ReadError) -> Option<Vec<(Str
     let [first, second, ..] = names.as_slice() else { return None };
     let mut naming = Naming::default();
     // the second stands in for an angle, so that the file is read at all
-    naming.add(&format!("t_s={first}")).ok()?;
-    naming.add(&format!("theta_deg={second}")).ok()?;
+    // and a factor of one keeps both in the units of the file
+    naming.add(&format!("t_s={first}*1")).ok()?;
+    naming.add(&format!("theta_deg={second}*1")).ok()?;
     let read = Recording::read_named(path, &naming).ok()?;
     let number = |text: &str| text.trim().replace(',', ".").parse().unwrap_or(f64::NAN);
     let mut columns = vec![((*first).to_owned(), read.t_s.clone())];

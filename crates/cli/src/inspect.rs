@@ -136,16 +136,24 @@ fn timing(t: &[f64]) -> (f64, f64, f64) {
 
 /// What a recording serves for, or what it lacks.
 fn uses(recording: &Recording) -> Vec<String> {
-    let say = |kind: &str, asked: Result<(), cvg_calibration::recording::ReadError>| match asked {
+    let say = |kind: &str, asked: Result<(), ReadError>| match asked {
         Ok(()) => format!("serves as {kind}"),
-        Err(_) => format!("does not serve as {kind}"),
+        Err(ReadError::MissingColumns { needed, .. }) => format!("does not serve as {kind}: it needs {needed}"),
+        Err(error) => format!("does not serve as {kind}: {error}"),
     };
     let rotation = if recording.require_rotation().is_ok() && input::stands_still(recording) {
         "does not serve as a rotation: the table does not turn".to_owned()
     } else {
         say("a rotation", recording.require_rotation())
     };
-    let mut out = vec![rotation, say("a ring-down", recording.require_ringdown())];
+    let mut out = vec![rotation];
+    if recording.require_rotation().is_err() {
+        if recording.xc_v.is_some() && recording.yc_v.is_some() {
+            out.push("serves as a sensor without a reference (--sensor)".to_owned());
+        }
+        out.push(say("a free decay", recording.require_decay()));
+    }
+    out.push(say("a ring-down", recording.require_ringdown()));
     if recording.vas_v.is_none() || recording.vqc_v.is_none() {
         out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
     }

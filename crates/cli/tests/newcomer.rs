@@ -73,6 +73,42 @@ fn a_campaign_of_foreign_files_is_identified_and_compensated_as_one_of_ours() {
 }
 
 #[test]
+fn what_a_recording_lacks_is_said_where_it_does_not_serve() {
+    let bench = Bench::small();
+    bench.write("two.csv", "t_s,xc_v,yc_v\n0,1,0\n1,0,1\n2,-1,0\n");
+    let said = run(&[&"inspect", &bench.path("two.csv")]);
+    for part in [
+        "does not serve as a rotation: it needs `t_s`, one of (`rate_dps`, `table_deg`)",
+        "serves as a sensor without a reference (--sensor)",
+        "does not serve as a ring-down: it needs `t_s`, `xc_v`, `yc_v` and `vas_v`",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+#[test]
+fn a_name_taken_from_the_message_is_read_in_the_unit_it_names() {
+    let bench = foreign_bench(&COLUMNS.replace("*0.001", ""));
+    let campaign = bench.campaign();
+    let said = run(&[&"inspect", &campaign]);
+    assert!(said.contains("`t_s` is in ms and taken to s") && said.contains("one every 0.010000 s"), "{said}");
+}
+
+#[test]
+fn a_compressed_recording_is_compensated_under_the_name_of_its_text() {
+    let bench = Bench::small();
+    let (campaign, results, clean) = (bench.campaign(), bench.path("results"), bench.path("clean"));
+    run(&[&"identify", &campaign, &"--out", &results]);
+    let names = bench.recordings("rot");
+    let [first, second] = [&names[0], &names[1]].map(|name| {
+        let packed = std::process::Command::new("gzip").arg(bench.path(name)).status();
+        packed.map_or_else(|_| bench.path(name), |_| bench.path(&format!("{name}.gz")))
+    });
+    run(&[&"compensate", &results.join("calibration.toml"), &first, &second, &"--out", &clean]);
+    assert!(fs::read_to_string(clean.join(&names[0])).unwrap().starts_with("t_s,rate_dps,xc_v"));
+}
+
+#[test]
 fn what_is_said_on_the_line_stands_over_the_campaign_file() {
     let bench = foreign_bench(COLUMNS);
     let campaign = bench.campaign();
