@@ -281,6 +281,62 @@ pub enum ReadError {
 }
 
 impl ReadError {
+    /// The file that it speaks of, as it was given.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::NotFound { path }
+            | Self::Directory { path }
+            | Self::Io { path, .. }
+            | Self::Format { path, .. }
+            | Self::Empty { path }
+            | Self::NoRows { path, .. }
+            | Self::Header { path, .. }
+            | Self::DuplicateColumn { path, .. }
+            | Self::MissingColumns { path, .. }
+            | Self::Cell { path, .. }
+            | Self::FieldCount { path, .. }
+            | Self::Quoting { path, .. }
+            | Self::EndlessLine { path, .. }
+            | Self::TimeBackwards { path, .. }
+            | Self::NothingUsable { path, .. }
+            | Self::NothingSettled { path, .. }
+            | Self::TooLarge { path, .. }
+            | Self::Parquet { path, .. }
+            | Self::Container { path, .. }
+            | Self::MappedColumn { path, .. }
+            | Self::Unit { path, .. }
+            | Self::Campaign { path, .. } => path,
+        }
+    }
+
+    /// The line or row that it speaks of.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        match self {
+            Self::NoRows { place, .. }
+            | Self::Cell { place, .. }
+            | Self::FieldCount { place, .. }
+            | Self::TimeBackwards { place, .. } => Some(*place),
+            Self::Header { line, .. } | Self::Quoting { line, .. } | Self::EndlessLine { line, .. } => {
+                Some(Place::Line(*line))
+            }
+            Self::Campaign { line, .. } => Some(Place::Line(*line as u64)),
+            _ => None,
+        }
+    }
+
+    /// The column that it speaks of, from 1: of a table that of its numbers, of a campaign file that of its letters.
+    #[must_use]
+    pub fn column(&self) -> Option<usize> {
+        match self {
+            Self::Cell { number, .. } => Some(*number),
+            Self::DuplicateColumn { second, .. } => Some(*second),
+            Self::Campaign { column, .. } => Some(*column),
+            _ => None,
+        }
+    }
+
     /// The error for a failed system call, with those that have a plainer name told apart.
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         let path = path.to_path_buf();

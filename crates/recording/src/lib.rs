@@ -12,6 +12,7 @@ mod admission;
 mod arrays;
 mod campaign;
 mod channel;
+mod columns;
 mod csv;
 mod dropped;
 mod error;
@@ -30,6 +31,7 @@ use std::path::PathBuf;
 
 pub use campaign::{Campaign, Instrument, Reference, Role, Run, RunKind};
 pub use channel::Channel;
+pub use columns::Values;
 pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};
 pub use memory::{limit_memory, memory_limit, panic_is_answer};
@@ -46,6 +48,8 @@ pub use unknown::{Cells, UnknownColumn};
 pub struct Recording {
     /// The file.
     pub source: PathBuf,
+    /// Whether [`Recording::source`] is a name alone, as of standard input or of columns in memory, whatever file has it.
+    pub in_memory: bool,
     /// Time, s.
     pub t_s: Vec<f64>,
     /// Input rate, commanded or measured, deg/s.

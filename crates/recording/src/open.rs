@@ -56,7 +56,9 @@ impl Recording {
     /// As [`Recording::read_named`].
     pub fn read_from(mut reader: impl Read + Send, naming: &Naming, source: &Path) -> Result<Self, ReadError> {
         let head = head_of(&mut reader).map_err(|error| ReadError::io(source, error))?;
-        stream(head, reader, None, naming, source)
+        let mut recording = stream(head, reader, None, naming, source)?;
+        recording.in_memory = true;
+        Ok(recording)
     }
 
     /// Reads a recording from the bytes of a CSV file; `source` is the name that errors and warnings give it.

@@ -65,6 +65,7 @@ fn recording(r: Recording, name: &str, stated_hz: Option<f64>) -> Result<Recordi
     }
     let mut out = Recording {
         source: r.source.clone(),
+        in_memory: r.in_memory,
         warnings: r.warnings.clone(),
         dropped: r.dropped.clone(),
         reference_hz: Some(frequency_hz),

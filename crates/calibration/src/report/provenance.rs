@@ -32,7 +32,10 @@ pub(crate) fn files(campaign: &Campaign) -> Vec<Named> {
             files.push(file);
         }
     }
-    files.into_iter().map(|file| Named { path: file.to_owned(), name: name(file, campaign) }).collect()
+    let in_memory = |file: &Path| campaign.runs.iter().any(|r| r.recording.in_memory && r.recording.source == file);
+    // a file that happens to have the name of what was never one is not what was read
+    let path = |file: &Path| if in_memory(file) { PathBuf::new() } else { file.to_owned() };
+    files.into_iter().map(|file| Named { path: path(file), name: name(file, campaign) }).collect()
 }
 
 /// The checksums of files.

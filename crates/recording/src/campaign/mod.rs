@@ -235,7 +235,31 @@ impl Campaign {
     }
 
     fn open_manifest(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
-        let manifest = Self::manifest(path)?;
+        Self::assembled(Self::manifest(path)?, path, naming, instrument, Recording::read_named)
+    }
+
+    /// The campaign of a campaign file's text, its recordings given by `read`, which is asked for each by the path that the
+    /// text names it by, joined to the folder of `path`; `path` is what errors call the text, and need not be a file.
+    ///
+    /// # Errors
+    /// As [`Campaign::open_as`], and what `read` refuses.
+    pub fn of_text(
+        text: &str,
+        path: &Path,
+        naming: &Naming,
+        instrument: Option<Instrument>,
+        read: impl FnMut(&Path, &Naming) -> Result<Recording, ReadError>,
+    ) -> Result<Self, ReadError> {
+        Self::assembled(manifest::parse(text.as_bytes(), path)?, path, naming, instrument, read)
+    }
+
+    fn assembled(
+        manifest: Manifest,
+        path: &Path,
+        naming: &Naming,
+        instrument: Option<Instrument>,
+        mut read: impl FnMut(&Path, &Naming) -> Result<Recording, ReadError>,
+    ) -> Result<Self, ReadError> {
         let instrument = instrument.unwrap_or(manifest.instrument);
         let naming = &naming.over(&manifest.naming);
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -243,8 +267,7 @@ impl Campaign {
         let mut warnings = manifest.warnings.clone();
         for entry in &manifest.runs {
             let file = folder.join(&entry.file);
-            let mut recording =
-                Recording::read_named(&file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
+            let mut recording = read(&file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
             warnings.extend(entry.constant_rate(&mut recording));
             match entry.kind {
                 RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,

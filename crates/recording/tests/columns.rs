@@ -1,0 +1,74 @@
+//! Columns in memory: the same recording as from a file with the same numbers, and the same refusals.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use cvg_recording::{Campaign, Channel, Naming, Place, ReadError, Recording, RunKind, Values};
+
+const TEXT: &str = "t_s,rate_dps,theta_deg,note\n0,10,0.5,a\n0.1,10,,b\n0.2,10,2.5,c\n0.3,10,3.5,d\n";
+
+fn columns() -> Vec<(String, Values)> {
+    let numbers = |name: &str, values: &[f64]| (name.to_owned(), Values::Numbers(values.to_vec()));
+    vec![
+        numbers("t_s", &[0.0, 0.1, 0.2, 0.3]),
+        numbers("rate_dps", &[10.0; 4]),
+        numbers("theta_deg", &[0.5, f64::INFINITY, 2.5, 3.5]),
+        ("note".to_owned(), Values::Texts(["a", "b", "c", "d"].into_iter().collect())),
+    ]
+}
+
+fn made(columns: Vec<(String, Values)>, naming: &Naming) -> Result<Recording, ReadError> {
+    Recording::of_columns(columns, naming, Path::new("frame"))
+}
+
+#[test]
+fn columns_in_memory_are_admitted_as_those_of_a_file() {
+    let (memory, file) =
+        (made(columns(), Naming::NONE).unwrap(), Recording::parse_csv(TEXT.as_bytes(), Path::new("frame")).unwrap());
+    for channel in Channel::ALL {
+        assert_eq!(memory.channel(channel), file.channel(channel), "{channel}");
+    }
+    assert_eq!((&memory.unknown, &memory.columns), (&file.unknown, &file.columns));
+    assert_eq!(memory.dropped.empty_or_nan.first, Some(Place::Row(2)));
+    assert_eq!(file.dropped.empty_or_nan.first, Some(Place::Line(3)));
+    assert!(memory.in_memory && !file.in_memory);
+}
+
+#[test]
+fn a_mapping_names_and_scales_columns_in_memory() {
+    let mut naming = Naming::default();
+    naming.add("t_s=ms*0.001").unwrap();
+    let mut own = columns();
+    own[0] = ("ms".to_owned(), Values::Numbers(vec![0.0, 100.0, 200.0, 300.0]));
+    assert_eq!(made(own, &naming).unwrap().t_s, [0.0, 0.2, 300.0 * 0.001]);
+}
+
+#[test]
+fn columns_that_cannot_be_a_recording_are_refused_with_their_place() {
+    let mut short = columns();
+    short[1].1 = Values::Numbers(vec![1.0]);
+    assert!(made(short, Naming::NONE).unwrap_err().to_string().contains("`rate_dps` has 1 values"));
+    let mut text = columns();
+    text[2].1 = Values::Texts(["1", "2", "3", "4"].into_iter().collect());
+    let error = made(text, Naming::NONE).unwrap_err();
+    assert_eq!((error.place(), error.column(), error.path()), (Some(Place::Row(1)), Some(3), Path::new("frame")));
+    let without = columns().into_iter().take(2).collect();
+    assert!(matches!(made(without, Naming::NONE), Err(ReadError::MissingColumns { .. })));
+    assert!(made(Vec::new(), Naming::NONE).is_err());
+}
+
+#[test]
+fn the_text_of_a_campaign_takes_recordings_from_anywhere() {
+    let text = "[campaign]\ndevice = \"unit\"\n[[run]]\nkind = \"rotation\"\nfile = \"first\"\n";
+    let opened = |text: &str| {
+        Campaign::of_text(text, Path::new("campaign"), Naming::NONE, None, |file, naming| {
+            assert_eq!(file, Path::new("first"));
+            Recording::of_columns(columns(), naming, file)
+        })
+    };
+    let campaign = opened(text).unwrap();
+    assert_eq!((campaign.device.as_str(), campaign.runs[0].kind), ("unit", RunKind::Rotation));
+    let error = opened(&text.replace("rotation", "waltz")).unwrap_err();
+    assert_eq!((error.place(), error.column()), (Some(Place::Line(4)), Some(8)), "{error}");
+}
