@@ -20,8 +20,7 @@ use crate::{Failure, input, output, report};
 pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     let text = std::fs::read_to_string(scenario)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", scenario.display())))?;
-    let parsed = Scenario::parse(&text)
-        .map_err(|e| Failure::input(format!("{}: {}", scenario.display(), scenario_problem(&e, &text))))?;
+    let parsed = scenario_of(&text, &scenario.display().to_string())?;
     output::check_folder(out)?;
     let progress = Progress::begin();
     progress.say("simulating");
@@ -32,6 +31,11 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     drop(progress);
     output::tell(format_args!("wrote {}", out.join("campaign.toml").display()));
     Ok(())
+}
+
+/// A scenario's text; `name` is what it is called where something is wrong with it.
+pub(crate) fn scenario_of(text: &str, name: &str) -> Result<Scenario, Failure> {
+    Scenario::parse(text).map_err(|e| Failure::input(format!("{name}: {}", scenario_problem(&e, text))))
 }
 
 /// What is wrong with a scenario and where, in one line.
@@ -46,7 +50,7 @@ fn scenario_problem(error: &ScenarioError, text: &str) -> String {
 
 /// Effects as text, and the files that they were read from.
 pub(crate) struct Written {
-    effects: Vec<EffectId>,
+    pub(crate) effects: Vec<EffectId>,
     files: Vec<PathBuf>,
 }
 

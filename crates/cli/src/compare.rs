@@ -12,11 +12,15 @@ use crate::{Failure, output};
 
 /// A parameter of one answer.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Parameter {
-    pub(crate) name: String,
-    pub(crate) unit: String,
-    pub(crate) value: f64,
-    pub(crate) ci95: Option<[f64; 2]>,
+pub struct Parameter {
+    /// its place in the report, keys joined by dots
+    pub name: String,
+    /// its unit
+    pub unit: String,
+    /// its value
+    pub value: f64,
+    /// ends of its 95 % interval, where it has one
+    pub ci95: Option<[f64; 2]>,
 }
 
 /// A parameter of both answers, or of one.

@@ -113,11 +113,15 @@ pub(crate) struct Wanted<'a> {
 
 /// Opens a campaign file, or makes a campaign of recordings.
 pub(crate) fn campaign(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
-    let mut campaign = opened(names, wanted)?;
-    if wanted.sensor {
+    Ok(as_wanted(opened(names, wanted)?, wanted.sensor))
+}
+
+/// The period that a sensor has where the campaign says none.
+pub(crate) fn as_wanted(mut campaign: Campaign, sensor: bool) -> Campaign {
+    if sensor {
         campaign.period_deg.get_or_insert(360.0);
     }
-    Ok(campaign)
+    campaign
 }
 
 fn opened(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
@@ -137,11 +141,21 @@ fn opened(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
         return Err(Failure::input(format!("{}: cannot be fitted to and held out at once", file.display())));
     }
     let settle_s = settle_s.unwrap_or(0.0);
+    let read: Vec<Recording> =
+        fitted.iter().chain(&held).map(|path| recording(path, naming)).collect::<Result<_, _>>()?;
+    of_recordings(read, fitted.len(), settle_s, instrument)
+}
+
+/// A campaign of recordings, the first of which are fitted to.
+pub(crate) fn of_recordings(
+    read: Vec<Recording>,
+    fitted: usize,
+    settle_s: f64,
+    instrument: Option<Instrument>,
+) -> Result<Campaign, Failure> {
     if !settle_s.is_finite() || settle_s < 0.0 {
         return Err(Failure::input(format!("--settle {settle_s}: wanted zero or more seconds")));
     }
-    let read: Vec<Recording> =
-        fitted.iter().chain(&held).map(|path| recording(path, naming)).collect::<Result<_, _>>()?;
     if let Some(still) = read.iter().find(|r| read.len() > 1 && stands_still(r)) {
         return Err(Failure::input(format!(
             "{}: the table does not turn, so it is no rotation; a ring-down has its place in a campaign.toml, with the \
@@ -152,7 +166,7 @@ fn opened(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
     let mut campaign = Campaign::of_recordings_as(read, instrument.unwrap_or_default()).map_err(explained)?;
     for (number, run) in campaign.runs.iter_mut().enumerate() {
         run.settle_s = settle_s;
-        if number >= fitted.len() {
+        if number >= fitted {
             run.role = Role::Holdout;
         }
         run.settled()?;
@@ -170,19 +184,21 @@ pub(crate) fn stands_still(recording: &Recording) -> bool {
 /// What would mend it, where the command line can.
 pub(crate) fn explained(error: ReadError) -> Failure {
     let (ReadError::MissingColumns { present, .. } | ReadError::MappedColumn { present, .. }) = &error else {
-        return Failure::input(error);
+        return error.into();
     };
     let there = |name: &str| present.split('`').any(|p| p == name);
     if there("xc_v") && there("yc_v") && there("t_s") {
-        return Failure::input(format!(
+        let message = format!(
             "{error}; a sin/cos sensor needs no reference: --sensor, or instrument = \"sensor\" in a campaign.toml"
-        ));
+        );
+        return Failure::of_file(message, &error);
     }
     let known = |name: &str| Channel::ALL.iter().any(|c| c.name().eq_ignore_ascii_case(name));
     let foreign = present.split('`').skip(1).step_by(2).find(|name| !known(name)).unwrap_or("Ch3");
     let channel = if foreign.to_lowercase().starts_with('t') { "t_s" } else { "theta_deg" };
-    Failure::input(format!(
+    let message = format!(
         "{error}; say which column is which, as in --map '{channel}={foreign}', or once for all in the [columns] of a \
          campaign.toml"
-    ))
+    );
+    Failure::of_file(message, &error)
 }

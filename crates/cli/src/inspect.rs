@@ -197,7 +197,7 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
     s
 }
 
-fn as_value(recording: &Recording) -> Value {
+pub(crate) fn as_value(recording: &Recording) -> Value {
     let (duration_s, interval_s, largest_interval_s) = timing(&recording.t_s);
     let columns: Vec<Value> = summaries(recording)
         .iter()

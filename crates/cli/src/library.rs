@@ -14,8 +14,7 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
         Some(id) => vec![EffectId::from_id(id).ok_or_else(|| unknown(id))?.description()],
     };
     if as_json {
-        let all: Vec<Value> = chosen.iter().map(|d| facts(d)).collect();
-        output::answer(&format!("{}\n", serde_json::to_string_pretty(&all).map_err(Failure::input)?))?;
+        output::answer(&format!("{}\n", as_json_text(&chosen)?))?;
     } else if as_markdown {
         output::answer(&page())?;
     } else if effect.is_some() {
@@ -28,6 +27,16 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
         }
     }
     Ok(())
+}
+
+/// The library as JSON.
+pub(crate) fn all_as_json() -> Result<String, Failure> {
+    as_json_text(&EffectId::ALL.iter().map(|e| e.description()).collect::<Vec<_>>())
+}
+
+fn as_json_text(chosen: &[&Description]) -> Result<String, Failure> {
+    let all: Vec<Value> = chosen.iter().map(|d| facts(d)).collect();
+    serde_json::to_string_pretty(&all).map_err(Failure::input)
 }
 
 /// Prints an effect of the library as an effect file.
