@@ -1,0 +1,117 @@
+"""What a recording may be, and how a campaign is said in a call."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Union
+
+Path = Union[str, "os.PathLike[str]"]
+#: a frame of pandas or polars, an Arrow table, or columns by their names
+Data = Any
+#: which column is which channel: {"t_s": "Time (ms)*0.001"}, or "t_s=Time (ms)*0.001" one by one
+Map = Union[Mapping[str, str], Iterable[str], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A recording in memory and what was done in it; the words are those of a campaign file."""
+
+    data: Data
+    name: str | None = None
+    kind: str = "rotation"
+    settle_s: float | None = None
+    holdout: bool = False
+    amplitude: float | None = None
+    angle_deg: float | None = None
+    energy_off_s: float | None = None
+    rate_dps: float | None = None
+
+    def is_plain(self) -> bool:
+        """Whether it is a rotation of which nothing else is said."""
+        others = (self.settle_s, self.amplitude, self.angle_deg, self.energy_off_s, self.rate_dps)
+        return self.kind == "rotation" and not self.holdout and all(value is None for value in others)
+
+
+def is_path(x: object) -> bool:
+    return isinstance(x, (str, os.PathLike))
+
+
+def several(x: object) -> list[Any]:
+    """What is one or a list of them."""
+    if x is None:
+        return []
+    if isinstance(x, (list, tuple)):
+        return list(x)
+    return [x]
+
+
+def paths(x: Iterable[Path]) -> list[str]:
+    return [os.fspath(path) for path in x]
+
+
+def entries(columns: Map) -> list[str]:
+    """The mapping as the command line says it."""
+    if columns is None:
+        return []
+    if isinstance(columns, Mapping):
+        return [f"{channel}={column}" for channel, column in columns.items()]
+    if isinstance(columns, str):
+        return [columns]
+    return list(columns)
+
+
+def runs(x: Sequence[object], first: int = 1) -> list[Run]:
+    """Runs with names: their own, or numbers where there are several."""
+    alone = len(x) == 1 and first == 1
+    made = [item if isinstance(item, Run) else Run(item) for item in x]
+    out = []
+    for number, run in enumerate(made, first):
+        name = run.name or ("recording" if alone else f"recording-{number}")
+        out.append(Run(**{**run.__dict__, "name": name}))
+    return out
+
+
+def _toml(value: object) -> str:
+    # strings, numbers and truth values are written alike in JSON and TOML
+    return json.dumps(value, ensure_ascii=False)
+
+
+def text(campaign: Mapping[str, object], recordings: Sequence[Run]) -> str:
+    """The campaign file that says this."""
+    lines = ["[campaign]"]
+    lines += [f"{key} = {_toml(value)}" for key, value in campaign.items() if value is not None]
+    for run in recordings:
+        said = {
+            "kind": run.kind,
+            "file": run.name,
+            "settle_s": run.settle_s,
+            "use": "holdout" if run.holdout else None,
+            "amplitude": run.amplitude,
+            "angle_deg": run.angle_deg,
+            "energy_off_s": run.energy_off_s,
+            "rate_dps": run.rate_dps,
+        }
+        lines += ["", "[[run]]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in said.items() if value is not None]
+    return "\n".join(lines) + "\n"
+
+
+def like(table: Any, pattern: object) -> Any:
+    """A table as what `pattern` is: of pandas, polars or pyarrow, or a dict of arrays."""
+    library = type(pattern).__module__.split(".")[0]
+    if library == "pandas":
+        import pandas
+
+        return pandas.DataFrame(table.to_dict())
+    if library == "polars":
+        import polars
+
+        return polars.DataFrame(table)
+    if library == "pyarrow":
+        import pyarrow
+
+        return pyarrow.table(table)
+    return table.to_dict() if isinstance(pattern, Mapping) else table

@@ -1,0 +1,183 @@
+//! Tables in and out by Arrow's C stream interface, and as numpy arrays. All unsafe code of the crate is here.
+
+use std::ffi::CStr;
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
+use arrow_array::types as number;
+use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray};
+use arrow_schema::{DataType, Field, Schema};
+use cvg_calibration::recording::Channel;
+use cvg_calibration::recording::{Cells, Recording, Values};
+use cvg_cli::service::Columns;
+use numpy::PyArray1;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyDict};
+
+/// The name that the interface gives its capsules.
+const STREAM: &CStr = c"arrow_array_stream";
+/// How pandas names an index that it hands out as a column.
+const INDEX: &str = "__index_level_";
+
+/// Columns of an object with `__arrow_c_stream__`.
+pub(crate) fn imported(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
+    let capsule = object.call_method0("__arrow_c_stream__")?.cast_into::<PyCapsule>()?;
+    let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
+    // SAFETY: a capsule of this name holds a valid stream, which is moved out of it: what is left is marked as released
+    let stream = unsafe { FFI_ArrowArrayStream::from_raw(pointer.as_ptr()) };
+    let broken =
+        |e: arrow_schema::ArrowError| PyValueError::new_err(format!("the stream of Arrow data breaks off: {e}"));
+    let reader = RecordBatchStreamReader::try_new(stream).map_err(broken)?;
+    let schema = reader.schema();
+    let mut columns: Vec<(String, Option<Values>)> = schema.fields().iter().map(|f| (f.name().clone(), None)).collect();
+    for batch in reader {
+        let batch = batch.map_err(broken)?;
+        for ((name, values), array) in columns.iter_mut().zip(batch.columns()) {
+            append(name, values, array)?;
+        }
+    }
+    let own = columns.into_iter().filter(|(name, _)| !name.starts_with(INDEX));
+    Ok(own.map(|(name, values)| (name, values.unwrap_or(Values::Numbers(Vec::new())))).collect())
+}
+
+/// Appends an array to a column.
+fn append(name: &str, column: &mut Option<Values>, array: &ArrayRef) -> PyResult<()> {
+    if let Some(more) = numbers(array) {
+        match column.get_or_insert_with(|| Values::Numbers(Vec::new())) {
+            Values::Numbers(values) if values.is_empty() => *values = more,
+            Values::Numbers(values) => values.extend(more),
+            Values::Texts(cells) => more.iter().for_each(|v| cells.push(&v.to_string())),
+        }
+        return Ok(());
+    }
+    let Some(more) = texts(array) else {
+        let what = format!("column `{name}` is of the Arrow type {}; wanted numbers or text", array.data_type());
+        return Err(PyTypeError::new_err(what));
+    };
+    match column.get_or_insert_with(|| Values::Texts(Cells::default())) {
+        Values::Texts(cells) => more.iter().for_each(|text| cells.push(text)),
+        Values::Numbers(_) => return Err(PyTypeError::new_err(format!("column `{name}` changes its type"))),
+    }
+    Ok(())
+}
+
+/// Numbers of any type as f64, nulls as NaN; none where they are no numbers.
+fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
+    macro_rules! from {
+        ($type:ty, $convert:expr) => {
+            Some(array.as_primitive::<$type>().iter().map(|v| v.map_or(f64::NAN, $convert)).collect())
+        };
+    }
+    #[allow(clippy::cast_precision_loss, reason = "numbers of a recording are f64")]
+    match array.data_type() {
+        DataType::Float64 if array.null_count() == 0 => {
+            Some(array.as_primitive::<number::Float64Type>().values().to_vec())
+        }
+        DataType::Float64 => from!(number::Float64Type, |v| v),
+        DataType::Float32 => from!(number::Float32Type, f64::from),
+        DataType::Int8 => from!(number::Int8Type, f64::from),
+        DataType::Int16 => from!(number::Int16Type, f64::from),
+        DataType::Int32 => from!(number::Int32Type, f64::from),
+        DataType::Int64 => from!(number::Int64Type, |v| v as f64),
+        DataType::UInt8 => from!(number::UInt8Type, f64::from),
+        DataType::UInt16 => from!(number::UInt16Type, f64::from),
+        DataType::UInt32 => from!(number::UInt32Type, f64::from),
+        DataType::UInt64 => from!(number::UInt64Type, |v| v as f64),
+        DataType::Null => Some(vec![f64::NAN; array.len()]),
+        _ => None,
+    }
+}
+
+fn texts(array: &ArrayRef) -> Option<Cells> {
+    match array.data_type() {
+        DataType::Utf8 => Some(array.as_string::<i32>().iter().map(Option::unwrap_or_default).collect()),
+        DataType::LargeUtf8 => Some(array.as_string::<i64>().iter().map(Option::unwrap_or_default).collect()),
+        DataType::Utf8View => Some(array.as_string_view().iter().map(Option::unwrap_or_default).collect()),
+        DataType::Boolean => {
+            Some(array.as_boolean().iter().map(|v| v.map_or("", |v| if v { "true" } else { "false" })).collect())
+        }
+        _ => None,
+    }
+}
+
+/// A table of columns, for whoever takes Arrow's C stream (`pyarrow.table`, `polars.DataFrame`, `pandas`) or numpy arrays.
+#[pyclass(frozen, module = "cvg")]
+#[derive(Debug)]
+pub(crate) struct Table {
+    batch: RecordBatch,
+}
+
+impl Table {
+    pub(crate) fn of(columns: Columns) -> PyResult<Self> {
+        let mut fields = Vec::new();
+        let mut arrays: Vec<ArrayRef> = Vec::new();
+        for (name, values) in columns {
+            let array: ArrayRef = match values {
+                Values::Numbers(values) => Arc::new(Float64Array::from(values)),
+                Values::Texts(cells) => Arc::new(StringArray::from_iter_values(cells.iter())),
+            };
+            fields.push(Field::new(name, array.data_type().clone(), false));
+            arrays.push(array);
+        }
+        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays);
+        Ok(Self { batch: batch.map_err(|e| PyValueError::new_err(e.to_string()))? })
+    }
+
+    /// The columns of a recording in the order in which it is written.
+    pub(crate) fn recording(recording: &Recording) -> PyResult<Self> {
+        let of = |name: &str| {
+            let numbers = Channel::of(name).and_then(|c| recording.channel(c)).map(|v| Values::Numbers(v.to_vec()));
+            let texts = || recording.unknown.iter().find(|u| u.name == name).map(|u| Values::Texts(u.cells.clone()));
+            numbers.or_else(texts).map(|values| (name.to_owned(), values))
+        };
+        Self::of(recording.column_names().filter_map(of).collect())
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Arrow's C stream of the table.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // a wish, which nobody has to grant
+        drop(requested_schema);
+        let batches = RecordBatchIterator::new([Ok(self.batch.clone())], self.batch.schema());
+        let stream = FFI_ArrowArrayStream::new(Box::new(batches));
+        PyCapsule::new_with_value(py, stream, STREAM)
+    }
+
+    /// The names of the columns.
+    #[getter]
+    fn column_names(&self) -> Vec<String> {
+        self.batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect()
+    }
+
+    fn __len__(&self) -> usize {
+        self.batch.num_rows()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<cvg.Table: {} rows of {}>", self.batch.num_rows(), self.column_names().join(", "))
+    }
+
+    /// Columns by their names: numpy arrays, lists of texts.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        for (name, array) in self.column_names().into_iter().zip(self.batch.columns()) {
+            match array.data_type() {
+                DataType::Float64 => {
+                    let values = array.as_primitive::<number::Float64Type>().values();
+                    out.set_item(name, PyArray1::from_slice(py, values))?;
+                }
+                _ => out.set_item(name, array.as_string::<i32>().iter().flatten().collect::<Vec<_>>())?,
+            }
+        }
+        Ok(out)
+    }
+}

@@ -1,0 +1,68 @@
+//! Columns of what Python programs keep recordings in.
+
+use cvg_calibration::recording::{Cells, Naming, Values};
+use cvg_cli::service::Columns;
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::{PyImportError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyMapping;
+
+use crate::arrow;
+use crate::errors::bad;
+
+/// Kinds of numpy types that are numbers.
+const NUMBERS: &str = "fiu";
+
+/// The columns of a frame, a table, or a mapping of names to arrays.
+pub(crate) fn columns(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
+    if object.hasattr("__arrow_c_stream__")? {
+        match arrow::imported(object) {
+            // pandas without pyarrow
+            Err(e) if e.is_instance_of::<PyImportError>(object.py()) => {}
+            other => return other,
+        }
+    }
+    if let Ok(mapping) = object.cast::<PyMapping>() {
+        let items = mapping.items()?;
+        return items.iter().map(|item| named(&item.get_item(0)?, &item.get_item(1)?)).collect();
+    }
+    if object.hasattr("columns")? {
+        let names = object.getattr("columns")?;
+        return names.try_iter()?.map(|name| name.and_then(|n| named(&n, &object.get_item(&n)?))).collect();
+    }
+    let what = format!(
+        "{} is no recording; wanted a frame, an Arrow table, or a mapping of column names to arrays",
+        object.get_type().name()?
+    );
+    Err(PyTypeError::new_err(what))
+}
+
+fn named(name: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<(String, Values)> {
+    let py = name.py();
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (values,))?;
+    let name: String = name.str()?.extract()?;
+    if array.getattr("ndim")?.extract::<usize>()? != 1 {
+        return Err(bad(py, format!("column `{name}` is no array of one dimension; wanted one value a row")));
+    }
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if NUMBERS.contains(&kind) {
+        let array = numpy.call_method1("ascontiguousarray", (array, "f8"))?;
+        let array: PyReadonlyArray1<'_, f64> = array.extract()?;
+        return Ok((name, Values::Numbers(array.as_slice()?.to_vec())));
+    }
+    let mut cells = Cells::default();
+    for value in array.try_iter()? {
+        cells.push(&value?.str()?.to_string_lossy());
+    }
+    Ok((name, Values::Texts(cells)))
+}
+
+/// What columns are called, from `CHANNEL=COLUMN*FACTOR`.
+pub(crate) fn naming(py: Python<'_>, entries: &[String]) -> PyResult<Naming> {
+    let mut naming = Naming::default();
+    for entry in entries {
+        naming.add(entry).map_err(|e| bad(py, format!("map: {e}")))?;
+    }
+    Ok(naming)
+}

@@ -1,0 +1,167 @@
+"""What a notebook and a program rely on: errors with their place, interruption, threads, tables, the instrument."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import re
+import signal
+import threading
+import time
+
+import numpy
+import pandas
+import polars
+import pyarrow
+import pytest
+
+import cvg
+
+
+@pytest.fixture(scope="module")
+def report(folder):
+    return cvg.identify(folder / "campaign.toml")
+
+
+def test_an_error_says_file_line_and_column(tmp_path):
+    recording = tmp_path / "rot.csv"
+    recording.write_text("t_s,rate_dps,theta_deg\n0,10,0\n0.1,10,zero\n0.2,10,2\n")
+    with pytest.raises(cvg.InputError) as raised:
+        cvg.identify(recording)
+    error = raised.value
+    assert (error.file, error.line, error.row, error.column) == (str(recording), 3, None, 3)
+    assert isinstance(error, ValueError) and "zero" in str(error)
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.line, again.column) == (str(error), 3, 3)
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text("[campaign]\ndevice = 3\n")
+    with pytest.raises(cvg.InputError) as raised:
+        cvg.identify(campaign)
+    assert (raised.value.file, raised.value.line) == (str(campaign), 2)
+
+
+def test_an_error_of_a_frame_says_its_row():
+    back = {"t_s": [0.0, 0.1, 0.2, 0.05], "rate_dps": [10.0] * 4, "theta_deg": [0.0, 1.0, 2.0, 3.0]}
+    with pytest.raises(cvg.InputError) as raised:
+        cvg.identify(back, name="bench 3")
+    assert (raised.value.file, raised.value.row, raised.value.line) == ("bench 3", 4, None)
+    with pytest.raises(cvg.InputError, match="map"):
+        cvg.identify({"Time": [0.0]})
+    for wrong in (7, [], [back, "rot.csv"]):
+        with pytest.raises((cvg.InputError, TypeError)):
+            cvg.identify(wrong)
+    with pytest.raises(cvg.InputError, match="one dimension"):
+        cvg.identify(back | {"t_s": numpy.zeros((4, 2))})
+
+
+def test_sound_data_without_an_answer_says_so_with_its_report(folder, cli):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    # an angle that follows nothing
+    rng = numpy.random.default_rng(1)
+    for name in ("xc_v", "xs_v", "yc_v", "ys_v"):
+        table[name] = rng.normal(size=len(table))
+    with pytest.raises(cvg.NoAnswer) as raised:
+        cvg.identify(table, name="standard input")
+    printed = cli("identify", "-", "--json", stdin=table.to_csv(index=False).encode(), status=1)
+    assert raised.value.json is not None and raised.value.json + "\n" == printed
+    assert pickle.loads(pickle.dumps(raised.value)).json == raised.value.json
+
+
+def test_a_file_of_the_name_of_a_frame_is_not_taken_for_it(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bench").write_text("not what was read")
+    report = cvg.identify(pandas.read_csv(folder / "rot+500.csv"), name="bench")
+    assert report.inputs == [{"file": "bench", "crc32": None}]
+
+
+def test_the_report_has_its_facts_as_attributes_frames_and_a_page(report):
+    assert report.status == "answered" and report.device == "unit-07"
+    assert report.heldout["discovered"]["rms_deg"] < report.heldout["raw"]["rms_deg"]
+    with pytest.raises(AttributeError, match="no `colour`"):
+        report.colour
+    frame = report.to_frame()
+    row = frame.set_index("name").loc["detection_gain_ratio"]
+    assert row["value"] == report.detection_gain_ratio["value"]
+    assert [row["low"], row["high"]] == report.detection_gain_ratio["ci95"]
+    page = report._repr_html_()
+    assert page.startswith("<iframe sandbox") and "unit-07" in page and re.search(r'[^=]"[^ >]', page) is None
+    assert "unit-07" in str(report) and "answered" in repr(report)
+
+
+def test_residuals_are_arrow_and_numpy_alike(report):
+    for table in (report.residuals(), report.bias()):
+        arrow, arrays = pyarrow.table(table), table.to_dict()
+        assert len(table) == arrow.num_rows > 100 and arrow.column_names == table.column_names
+        assert set(arrays["run"]) <= {"rot+500.csv", "rot-300.csv"}
+        for name in table.column_names[1:]:
+            numpy.testing.assert_array_equal(arrow[name].to_numpy(), arrays[name])
+        assert polars.DataFrame(table).equals(polars.from_arrow(arrow))
+    assert numpy.sqrt(numpy.mean(report.residuals().to_dict()["error_deg"] ** 2)) < 0.1
+
+
+def test_the_interpreter_is_free_meanwhile_and_progress_is_told(folder):
+    ticks, told, done = [], [], threading.Event()
+
+    def tick() -> None:
+        while not done.wait(0.005):
+            ticks.append(time.monotonic())
+
+    other = threading.Thread(target=tick)
+    other.start()
+    began = time.monotonic()
+    cvg.identify(folder / "campaign.toml", progress=told.append)
+    lasted = time.monotonic() - began
+    done.set()
+    other.join()
+    assert "reading" in told and "fitting the declared model" in told
+    # held for the whole time, the other thread had not run at all
+    assert len(ticks) > 0.1 * lasted / 0.005, (len(ticks), lasted)
+
+
+def test_a_keyboard_interrupt_ends_it(folder):
+    def interrupt(what: str) -> None:
+        if what == "fitting the declared model":
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        cvg.identify(folder / "campaign.toml", progress=interrupt)
+    # and what comes after is not disturbed
+    assert cvg.identify(folder / "campaign.toml").status == "answered"
+
+
+def test_what_progress_raises_comes_back(folder):
+    def refuse(what: str) -> None:
+        raise LookupError(what)
+
+    with pytest.raises(LookupError, match="reading"):
+        cvg.identify(folder / "campaign.toml", progress=refuse)
+
+
+def test_a_simulation_says_what_it_was_set_to():
+    with pytest.raises(cvg.InputError, match="line 2, column"):
+        cvg.simulate("device = 'a'\nrun = 3\n")
+    with pytest.raises(cvg.InputError) as raised:
+        cvg.simulate("nowhere.toml")
+    assert raised.value.file == "nowhere.toml"
+
+
+def test_the_instrument_steps_over_arrays_and_goes_on_where_it_was():
+    t = numpy.arange(4000) / 100_000.0
+    x, y = 0.5 * numpy.cos(2e5 * numpy.pi * 0.152 * t), numpy.full_like(t, 0.0)
+    whole, parts = cvg.Instrument(), cvg.Instrument()
+    once = whole.step(x, y)
+    twice = [parts.step(x[i : i + 1000], y[i : i + 1000]) for i in range(0, 4000, 1000)]
+    for got, pieces in zip(once, zip(*twice)):
+        numpy.testing.assert_array_equal(got, numpy.concatenate(pieces))
+    assert whole.mode == parts.mode and whole.fault == parts.fault
+    assert numpy.isfinite(once[0]).all() and numpy.abs(once[0]).max() <= 10.0
+    total = cvg.Instrument().step(numpy.array([numpy.nan, numpy.inf]), numpy.array([0.0, -numpy.inf]))
+    assert all(numpy.isfinite(out).all() for out in total)
+    with pytest.raises(cvg.InputError):
+        cvg.Instrument(sample_hz=-1.0)
+    with pytest.raises(cvg.InputError, match="as many"):
+        whole.step(x, y[1:])
+
+
+def test_a_calibration_travels_between_processes(report):
+    assert pickle.loads(pickle.dumps(report.calibration)).to_text() == report.calibration.to_text()
