@@ -90,6 +90,17 @@ pub(crate) fn fleet(names: &[PathBuf], out: &Path, limits: Option<&Limits>, json
     Ok(())
 }
 
+/// What devices say together, by their names, the reasons why they have no answer, and their reports, as fleet.json has it.
+pub(crate) fn population(devices: Vec<(String, Option<String>, Option<String>)>) -> Result<Value, Failure> {
+    let row = |(name, reason, report): (String, Option<String>, Option<String>)| {
+        let unread = || Ok(json!({"device": name, "status": "refused", "reason": reason.unwrap_or_default()}));
+        let report = report.map_or_else(unread, |text| serde_json::from_str(&text).map_err(Failure::input))?;
+        Ok(Row { folder: name, campaign: PathBuf::new(), report, outside: None })
+    };
+    let rows: Vec<Row> = devices.into_iter().map(row).collect::<Result<_, Failure>>()?;
+    Ok(Population::of(&rows).facts(&rows))
+}
+
 /// The campaigns behind names, patterns and folders; of a folder without one, those of the folders in it.
 fn campaigns(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut out = Vec::new();

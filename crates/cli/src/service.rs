@@ -16,7 +16,7 @@ use serde_json::Value;
 use crate::commands::{self, Told};
 pub use crate::compare::Parameter;
 use crate::input::{self, Wanted};
-use crate::{Failure, compare, inspect, library, report};
+use crate::{Failure, compare, fleet, inspect, library, report};
 
 /// Columns of a recording by their names.
 pub type Columns = Vec<(String, Values)>;
@@ -227,6 +227,14 @@ impl Answered {
     pub fn answer(&self) -> &Answer {
         &self.answer
     }
+}
+
+/// What devices say together, as `cvg fleet --json` says it: of each its name, why it has no answer, and its report.
+///
+/// # Errors
+/// Where a report is none.
+pub fn population(devices: Vec<(String, Option<String>, Option<String>)>) -> Result<String, Failure> {
+    serde_json::to_string_pretty(&fleet::population(devices)?).map_err(Failure::input)
 }
 
 /// What is in recordings, as `cvg inspect --json` says it.

@@ -185,3 +185,9 @@ pub(crate) fn inspect_runs(
 pub(crate) fn effects(py: Python<'_>) -> PyResult<String> {
     service::effects().map_err(|e| failed(py, &e))
 }
+
+/// What devices say together, as JSON.
+#[pyfunction]
+pub(crate) fn population(py: Python<'_>, devices: Vec<(String, Option<String>, Option<String>)>) -> PyResult<String> {
+    service::population(devices).map_err(|e| failed(py, &e))
+}

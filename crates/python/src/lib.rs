@@ -21,7 +21,7 @@ mod _cvg {
     use super::*;
 
     #[pymodule_export]
-    use super::answer::{Report, effects, identify_files, identify_runs, inspect_files, inspect_runs};
+    use super::answer::{Report, effects, identify_files, identify_runs, inspect_files, inspect_runs, population};
     #[pymodule_export]
     use super::arrow::Table;
     #[pymodule_export]
