@@ -26,8 +26,9 @@ const LEVEL: f64 = 1e-3;
 /// Half width of the angular gain's interval where a drift of 1e-3 rad/s may go unrecorded in each of several runs, the
 /// fastest at 500 deg/s: 1.96 · 1e-3 / 8.7, with room for the slower ones.
 const WIDEST_ANGULAR_GAIN: f64 = 5e-4;
-/// One campaign in so many may give no answer.
-const MOST_UNANSWERED: u64 = 10;
+/// The share of campaigns that may give no answer in the long run; one in so many may claim an effect that is not there.
+const MOST_UNANSWERED: f64 = 0.1;
+const MOST_FALSE_CLAIMS: u64 = 100;
 /// Errors that are printed one by one, in standard deviations.
 const FAR: f64 = 3.0;
 
@@ -55,7 +56,9 @@ struct Answer {
     estimates: [Option<Estimate>; 3],
     truth: [f64; 3],
     noise_v: f64,
+    /// effects of the library that were discovered, and what was corrected without a cause
     claimed: Vec<String>,
+    corrected: Vec<String>,
     over_floor: f64,
 }
 
@@ -66,13 +69,15 @@ fn answer(seed: u64, coloured: Option<Coloured>, without: &[&str]) -> Answer {
     }
     let noise_v = settings.noise_v;
     let identified = identify_without(settings, without).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
-    let claimed = [Origin::Discovered, Origin::Empirical].map(|o| found(&identified, o)).concat();
+    let [claimed, corrected] =
+        [Origin::Discovered, Origin::Empirical].map(|o| found(&identified, o).into_iter().map(str::to_owned).collect());
     let r = &identified.report;
     Answer {
         estimates: [r.detection_gain_ratio, r.actuation_gain_ratio, Some(r.angular_gain)],
         truth,
         noise_v,
-        claimed: claimed.into_iter().map(str::to_owned).collect(),
+        claimed,
+        corrected,
         over_floor: over_floor(&identified),
     }
 }
@@ -127,7 +132,7 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
         let highest = if highest < 1.0 { binomial_quantile(told.len() as u64, highest, 1.0 - LEVEL) } else { count };
         // under strong noise an interval may be too wide to be an answer, now and then
         let unanswered = count - told.len() as u64;
-        if unanswered * MOST_UNANSWERED > count {
+        if unanswered > binomial_quantile(count, MOST_UNANSWERED, 1.0 - LEVEL) {
             failures.push(format!("{name}: {unanswered} of {count} campaigns gave no answer"));
         }
         if !(lowest..=highest).contains(&held) {
@@ -145,14 +150,17 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
     let claims: Vec<String> = answers
         .iter()
         .enumerate()
-        .filter(|(_, a)| !a.claimed.is_empty())
-        .map(|(seed, a)| format!("seed {seed}: {}", a.claimed.join(", ")))
+        .filter(|(_, a)| !(a.claimed.is_empty() && a.corrected.is_empty()))
+        .map(|(seed, a)| format!("seed {seed}: {}", [&a.claimed[..], &a.corrected].concat().join(", ")))
         .collect();
     let worst = answers.iter().map(|a| a.over_floor).fold(0.0, f64::max);
     println!(
         "  effects claimed where none is: {}{claims:?}; worst held-out error over the floor {worst:.3}",
         claims.len()
     );
+    if claims.len() as u64 * MOST_FALSE_CLAIMS > count {
+        failures.push(format!("effects claimed in {} of {count} campaigns that have none", claims.len()));
+    }
     failures
 }
 
@@ -171,16 +179,28 @@ fn intervals_hold_under_noise_that_remembers() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// Nothing tells what the drive does, so that there is no actuation ratio, and the angular gain is as uncertain as a
-/// drift that nobody recorded makes it: believed within limits, and not drawn from a distribution of its own.
+/// What the loops do is told by the amplitude and the quadrature that they hold, and so is the actuation ratio; the angular
+/// gain is as uncertain as a steady drift makes it: believed within limits, and not drawn from a distribution of its own.
 #[test]
 fn intervals_hold_without_the_commands_of_the_loops() {
     let without = ["vas_v", "vqc_v"];
     let answers = all(trials(OTHER_TRIALS), |seed| answer(2000 + seed, None, &without));
-    let failures = failures(&answers, &[0, 2], 1.0);
+    let failures = failures(&answers, &[0, 1, 2], 1.0);
     assert!(failures.is_empty(), "{failures:#?}");
     let widest = answers.iter().filter_map(|a| a.estimates[2].map(|e| e.half_width())).fold(0.0, f64::max);
     assert!(widest < WIDEST_ANGULAR_GAIN, "± {widest:.1e}");
+}
+
+/// Two channels and nothing else: what a split of the frequencies does to the pattern is corrected without a cause where it
+/// stands out, and hides what the drive does.
+#[test]
+fn intervals_hold_with_the_in_phase_channels_alone() {
+    let without = ["vas_v", "vqc_v", "xs_v", "ys_v"];
+    let answers =
+        all(trials(OTHER_TRIALS), |seed| Answer { corrected: Vec::new(), ..answer(3000 + seed, None, &without) });
+    let failures = failures(&answers, &[0, 2], 1.0);
+    assert!(failures.is_empty(), "{failures:#?}");
+    assert!(answers.iter().all(|a| a.estimates[1].is_none()));
 }
 
 /// Where the readout's gains differ much, the energy command is hardly ever along the vibration and turns the pattern as

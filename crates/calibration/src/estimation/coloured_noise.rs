@@ -14,10 +14,9 @@ pub(crate) const TABLE_MEMORY_S: [f64; 3] = [0.3, 3.0, 30.0];
 pub(crate) const GAIN_MEMORY_S: [f64; 5] = [0.03, 0.3, 3.0, 30.0, 300.0];
 /// The bias of a segment before its first sample: variance over that of the white part.
 const DIFFUSE: f64 = 1e10;
-/// How fast commands that were not recorded precess a pattern, rad/s: tan(θ_error)/τ for an angle wrong by 10 mrad and
-/// τ = 10 s; and by how much that changes with twice the pattern angle.
+/// How fast commands that were not recorded precess a pattern steadily, rad/s: tan(θ_error)/τ for a force that is wrong by
+/// 10 mrad at every angle and τ = 10 s.
 pub(crate) const DRIFT_RAD_S: f64 = 1e-3;
-const UNEVEN_DRIFT_RAD_S: f64 = 1e-4;
 /// Samples of a block whose whitened scores are summed before they are squared.
 const BLOCK: usize = 64;
 
@@ -65,9 +64,6 @@ enum Kind {
     Table,
     /// a steady drift of the pattern
     Drift,
-    /// drifts with sine and cosine of twice the pattern angle
-    DriftSine,
-    DriftCosine,
     /// a relative deviation of the gains' ratio
     Gain,
 }
@@ -146,7 +142,6 @@ impl Filter {
         let drift = states.len();
         if surroundings.drift.is_some() {
             states.extend([lasting(Kind::Drift, DRIFT_RAD_S)]);
-            states.extend([Kind::DriftSine, Kind::DriftCosine].map(|kind| lasting(kind, UNEVEN_DRIFT_RAD_S)));
         }
         let gains = states.len();
         if noise.gains > 0.0 {
@@ -209,8 +204,6 @@ impl Filter {
                 * match state.kind {
                     Kind::Table => o.precession_rad_s,
                     Kind::Drift => 1.0,
-                    Kind::DriftSine => o.twice[0],
-                    Kind::DriftCosine => o.twice[1],
                     Kind::Angle | Kind::Gain => 0.0,
                 };
         }

@@ -25,6 +25,8 @@ pub mod belief {
     pub const ANISOELASTICITY_RAD_S: f64 = 6.3;
     /// ln(G_Ax/G_Ay)
     pub const ACTUATION_RATIO: f64 = 0.15;
+    /// 1/τ, 1/s, where commands and ring-downs are missing: time constants of 8 s and more
+    pub const DAMPING_PER_S: f64 = 0.06;
     /// control latency, s
     pub const CONTROL_LATENCY_S: f64 = 2e-3;
     /// the energy command cannot change the amplitude faster than this, 1/s
@@ -133,6 +135,9 @@ impl Dataset {
             start.follows_input = true;
             start.angular_gain = -start.angular_gain;
         }
+        if !prepared.iter().any(|p| p.track.has_commands()) {
+            start.damping_per_s = belief::DAMPING_PER_S;
+        }
         let command_rms = command_rms(&prepared);
         Ok(Self {
             instrument,
@@ -152,14 +157,18 @@ impl Dataset {
     /// The unknowns of a hypothesis on this campaign: what the recorded columns can speak of at all.
     ///
     /// How strong the commands are and how late turns the pattern at a steady rate: k is uncertain by both in any case.
-    /// What else they do is left alone unless runs at two or more rates, or in both directions, can tell it.
+    /// Where nobody recorded them, what they hold is known instead, all but the damping that they replace. What else they
+    /// do is left alone unless runs at two or more rates, or in both directions, can tell it.
     pub(crate) fn unknowns(&self, hypothesis: &Hypothesis) -> Vec<Unknown> {
         let mut all = vec![Unknown::AngularGain];
         let recorded = self.tracks.iter().any(|t| t.track.has_commands());
-        let commands = self.drive_is_free && recorded;
+        let gyroscope = self.instrument == Instrument::Gyroscope;
+        let commands = self.drive_is_free && gyroscope;
         let quadrature = self.tracks.iter().any(|t| t.track.has_quadrature());
-        if self.instrument == Instrument::Gyroscope && recorded {
+        if gyroscope && recorded {
             all.extend([Unknown::ForceScale, Unknown::ControlLatency]);
+        } else if gyroscope {
+            all.extend([Unknown::Damping, Unknown::ControlLatency]);
         }
         all.extend(hypothesis.effect_unknowns().into_iter().filter(|u| match u {
             Unknown::Effect(i, _) => match hypothesis.members[*i].id {
@@ -246,11 +255,19 @@ impl Dataset {
         self.both_directions() || self.speeds_differ()
     }
 
+    /// Runs that differ, and commands or all that they hold, tell what the drive does.
+    pub(crate) fn tells_the_drive(&self) -> bool {
+        self.tracks_differ() && self.tracks.iter().any(|p| p.track.has_commands() || p.track.has_quadrature())
+    }
+
     /// Priors for the unknowns that the data may be silent about.
     pub(crate) fn priors(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Vec<Prior> {
         let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
         let considered = !self.drive_is_free;
-        let mut all = vec![Prior { considered, ..prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S) }];
+        let mut all = vec![
+            Prior { considered, ..prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S) },
+            Prior { considered: true, ..prior(Unknown::Damping, belief::DAMPING_PER_S, belief::DAMPING_PER_S) },
+        ];
         let mut effect = |id, p, mean, deviation| {
             if let Some(member) = hypothesis.position(id) {
                 all.push(prior(Unknown::Effect(member, p), mean, deviation));
@@ -502,7 +519,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         dataset.balance_quadrature(&hypothesis);
         let last = round + 1 >= ROUNDS;
         dataset.drive_is_free =
-            last && dataset.tracks_differ() && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
+            last && dataset.tells_the_drive() && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
         let (result, settled) =
             dataset.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
         hypothesis = result.hypothesis.clone();
@@ -510,7 +527,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         if !last || !(settled || round >= MOST_ROUNDS) {
             continue;
         }
-        if explains.is_none() && !dataset.drive_is_free && dataset.tracks_differ() {
+        if explains.is_none() && !dataset.drive_is_free && dataset.tells_the_drive() {
             let (held, before) = (dataset.state(), dataset.excess());
             dataset.drive_is_free = true;
             let (freed, _) = dataset.fitted(&hypothesis, drive.as_ref(), Effort::FULL);

@@ -88,6 +88,7 @@ pub(crate) fn propagate(
     let mut vibration = Vibration::new();
     // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
     let mut integrals = Integrals::new(2 * (n + 1));
+    let mut held = Held::default();
     let mut excess = Jet::constant(0.0);
     // what the input effects added before the segment: the table's angle is 0 where the recording starts
     let mut ahead = 0.0;
@@ -132,6 +133,9 @@ pub(crate) fn propagate(
             passed_over = if believed { 0 } else { passed_over + 1 };
             if believed {
                 integrals.extend_to(track.t_s[i], &integrands);
+                if !track.has_commands() {
+                    held.extend_to(&vibration, &mut integrals.sum);
+                }
             }
         }
         let predicted = along + integrals.sum[0];
@@ -196,6 +200,36 @@ fn excess_angle(
     sum * Jet::constant(0.5 * h * (t1 - t0))
 }
 
+/// How far the pattern precesses while loops that nobody recorded follow the amplitude and the quadrature that are read,
+/// ∫ s_a d ln a + ∫ s_Q dQ with the steering s, by the trapezium: it needs no rate of what is noisy.
+#[derive(Default)]
+struct Held {
+    /// steering, ln a and Q of the last sample, and slopes of the first and the third
+    last: Option<([f64; 4], Vec<[f64; 2]>)>,
+}
+
+impl Held {
+    /// Adds the step to `vibration` to the integral of θ̇ and its slopes, which stand first in `sum`. How the small part by
+    /// the quadrature changes with the unknowns is left out.
+    fn extend_to(&mut self, vibration: &Vibration, sum: &mut [f64]) {
+        use quantity::{LN_AMPLITUDE, STEERING};
+        let [by_growth, by_quadrature] = vibration.steering;
+        let now = [by_growth, by_quadrature, vibration.ln_amplitude, vibration.envelope.pendulum().q];
+        let slopes_now = vibration.slopes.iter().map(|s| [s[STEERING], s[LN_AMPLITUDE]]);
+        let Some((before, slopes)) = &mut self.last else {
+            self.last = Some((now, slopes_now.collect()));
+            return;
+        };
+        let (mean, change) = (0.5 * (now[0] + before[0]), now[2] - before[2]);
+        sum[0] += mean * change + 0.5 * (now[1] + before[1]) * (now[3] - before[3]);
+        for ((total, was), is) in sum[1..].iter_mut().zip(slopes.iter_mut()).zip(slopes_now) {
+            *total += 0.5 * (is[0] + was[0]) * change + mean * (is[1] - was[1]);
+            *was = is;
+        }
+        *before = now;
+    }
+}
+
 /// Running integrals of sampled quantities: the Adams–Moulton rule of fourth order on even samples, the trapezium
 /// where the spacing changes.
 struct Integrals {
@@ -240,5 +274,104 @@ impl Integrals {
         self.times.rotate_right(1);
         self.times[0] = t;
         self.known = (self.known + 1).min(3);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::hypothesis::{Origin, Unknown};
+    use crate::recording::{Recording, Role, Run, RunKind};
+    use cvg_model::effects::EffectId;
+
+    /// A pattern that turns at 5 rad/s with an amplitude and a quadrature that follow it; no commands.
+    fn track() -> Track {
+        let t_s: Vec<f64> = (0..400).map(|i| 0.01 * f64::from(i)).collect();
+        let of = |f: fn(f64, f64) -> f64| {
+            Some(t_s.iter().map(|t| f(-5.0 * t, 1.0 + 0.01 * (10.0 * t).sin())).collect::<Vec<_>>())
+        };
+        let recording = Recording {
+            xc_v: of(|theta, a| a * theta.cos()),
+            xs_v: of(|theta, _| -2e-3 * theta.sin() * (2.0 * theta).cos()),
+            yc_v: of(|theta, a| a * theta.sin()),
+            ys_v: of(|theta, _| 2e-3 * theta.cos() * (2.0 * theta).cos() + 1e-3),
+            rate_dps: Some(vec![(5.0_f64 / 0.8).to_degrees(); t_s.len()]),
+            t_s,
+            ..Recording::default()
+        };
+        let run = Run {
+            kind: RunKind::Rotation,
+            file: "spin.csv".into(),
+            settle_s: 0.0,
+            role: Role::Fit,
+            amplitude: None,
+            recording,
+        };
+        Track::whole(run, std::f64::consts::PI).expect("a track")
+    }
+
+    /// What is left of the angle at the end of the track, and its slopes.
+    fn left_at_the_end(track: &Track, hypothesis: &Hypothesis, unknowns: &Unknowns) -> (f64, Vec<f64>) {
+        let (mut angle, mut slopes) = (0.0, Vec::new());
+        propagate(track, &track.segments[0], hypothesis, unknowns, Start::default(), Stepping::every(1), |row| {
+            angle = row.angle;
+            slopes = row.angle_slopes.to_vec();
+        });
+        (angle, slopes)
+    }
+
+    #[test]
+    fn what_loops_do_that_nobody_recorded_changes_with_the_unknowns_as_finite_differences_say() {
+        let track = track();
+        let mut hypothesis = Hypothesis::ideal(crate::recording::Instrument::Gyroscope, std::f64::consts::PI, 0.8);
+        (hypothesis.damping_per_s, hypothesis.control_latency_s) = (0.06, 1e-3);
+        let values = [
+            (EffectId::DetectionGainMismatch, 0, 1.05),
+            (EffectId::ActuationGainMismatch, 0, 0.96),
+            (EffectId::Anisodamping, 0, 0.01),
+            (EffectId::Anisoelasticity, 1, 0.2),
+        ];
+        let mut all = vec![Unknown::Damping, Unknown::ControlLatency];
+        for (id, ..) in values {
+            hypothesis.admit(id, Origin::Declared);
+        }
+        for (id, p, value) in values {
+            let unknown = Unknown::Effect(hypothesis.position(id).expect("a member"), p);
+            hypothesis.set(unknown, value);
+            all.push(unknown);
+        }
+        let unknowns = Unknowns::new(&hypothesis, all.clone());
+        let (_, slopes) = left_at_the_end(&track, &hypothesis, &unknowns);
+        for (unknown, slope) in all.into_iter().zip(slopes) {
+            let moved = |by: f64| {
+                let mut h = hypothesis.clone();
+                h.set(unknown, h.get(unknown) + by);
+                left_at_the_end(&track, &h, &unknowns).0
+            };
+            let by = 1e-5;
+            // a slope is that of the prediction less the observation
+            let numeric = (moved(-by) - moved(by)) / (2.0 * by);
+            assert!((slope - numeric).abs() < 0.02 * numeric.abs() + 1e-5, "{unknown:?}: {slope} against {numeric}");
+        }
+    }
+
+    #[test]
+    fn a_loop_that_holds_the_amplitude_turns_the_pattern_where_it_is_read_wrong() {
+        let track = track();
+        let steady = Hypothesis::ideal(crate::recording::Instrument::Gyroscope, std::f64::consts::PI, 0.8);
+        let mut mismatched = steady.clone();
+        let member = mismatched.admit(EffectId::ActuationGainMismatch, Origin::Declared);
+        mismatched.set(Unknown::Effect(member, 0), 1.04);
+        let left = |h: &Hypothesis| left_at_the_end(&track, h, &Unknowns::new(h, Vec::new())).0;
+        let [ideal, held] = [0.0, 0.1].map(|d| left(&damped_by(&steady, d)));
+        assert!((ideal - held).abs() < 1e-6, "forces along the pattern don't turn it: {ideal}, {held}");
+        let forced = |damping_per_s| left(&damped_by(&mismatched, damping_per_s));
+        // forces of 0.1/s off by ½(g − 1) sin 2θ: 0.02·0.1·sin 2θ rad/s, integrated over θ = −5 t from 0 to 3.99 s
+        let expected = 0.02 * 0.1 * ((2.0 * 5.0 * 3.99_f64).cos() - 1.0) / 10.0;
+        assert!((forced(0.1) - forced(0.0) - expected).abs() < 0.05 * expected.abs(), "{}", forced(0.1) - forced(0.0));
+    }
+
+    fn damped_by(hypothesis: &Hypothesis, damping_per_s: f64) -> Hypothesis {
+        Hypothesis { damping_per_s, ..hypothesis.clone() }
     }
 }

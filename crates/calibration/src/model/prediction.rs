@@ -29,16 +29,20 @@ pub(crate) struct Vibration {
     /// how fast the hypothesis lets it turn and grow besides −kΩ, rad/s and 1/s
     pub(crate) theta_rate: f64,
     pub(crate) growth: f64,
-    /// slopes of the four against the unknowns, in their order
-    pub(crate) slopes: Vec<[f64; 4]>,
+    /// where no commands were recorded: what the loops turn the pattern by, rad, for a unit of ln a and of the quadrature
+    /// that they make
+    pub(crate) steering: [f64; 2],
+    /// slopes of the four and of the steering by ln a against the unknowns, in their order
+    pub(crate) slopes: Vec<[f64; 5]>,
 }
 
-/// Index of the four quantities of [`Vibration`] in its slopes.
+/// Index of the quantities of [`Vibration`] in its slopes.
 pub(crate) mod quantity {
     pub(crate) const THETA: usize = 0;
     pub(crate) const LN_AMPLITUDE: usize = 1;
     pub(crate) const THETA_RATE: usize = 2;
     pub(crate) const GROWTH: usize = 3;
+    pub(crate) const STEERING: usize = 4;
 }
 
 /// Effects that act in one stage, one after the other, with their values.
@@ -58,6 +62,8 @@ pub(crate) struct Predictor<'h> {
     units: Vec<(usize, EffectId, Values<f64>)>,
     actuation: Drive<f64>,
     actuation_of_jets: Drive<Jet>,
+    /// of unit scale: what a loop does that nobody recorded
+    loops: Drive<Jet>,
     input: Chain<Jet>,
 }
 
@@ -85,6 +91,11 @@ impl<'h> Predictor<'h> {
             _ => None,
         };
         let lanes = &unknowns.forcing;
+        let drive = |force_scale| Drive {
+            force_scale,
+            control_latency_s: lanes.jet(hypothesis.control_latency_s, lanes.control_latency),
+            effects: jets(Stage::Actuation, lanes),
+        };
         Self {
             hypothesis,
             unknowns,
@@ -101,11 +112,8 @@ impl<'h> Predictor<'h> {
                 control_latency_s: hypothesis.control_latency_s,
                 effects: plain(Stage::Actuation),
             },
-            actuation_of_jets: Drive {
-                force_scale: lanes.jet(hypothesis.force_scale, lanes.force_scale),
-                control_latency_s: lanes.jet(hypothesis.control_latency_s, lanes.control_latency),
-                effects: jets(Stage::Actuation, lanes),
-            },
+            actuation_of_jets: drive(lanes.jet(hypothesis.force_scale, lanes.force_scale)),
+            loops: drive(Jet::constant(1.0)),
             input: jets(Stage::Input, &unknowns.input),
         }
     }
@@ -120,8 +128,9 @@ impl<'h> Predictor<'h> {
     ) {
         use quantity::{GROWTH, LN_AMPLITUDE, THETA, THETA_RATE};
         let (hypothesis, unknowns) = (self.hypothesis, self.unknowns);
+        let recorded = commands.is_some();
         out.slopes.clear();
-        out.slopes.resize(unknowns.all.len(), [0.0; 4]);
+        out.slopes.resize(unknowns.all.len(), [0.0; 5]);
         let lanes = &unknowns.forcing;
         let commands = commands.filter(|_| hypothesis.force_scale != 0.0 || !lanes.columns.is_empty());
         let seen_axis = commands.map(|_| major_axis(&seen, &seen.pendulum()));
@@ -157,7 +166,7 @@ impl<'h> Predictor<'h> {
         }
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
-        (out.theta_rate, out.growth) = (0.0, 0.0);
+        (out.theta_rate, out.growth, out.steering) = (0.0, 0.0, [0.0; 2]);
         if !mechanical {
             return;
         }
@@ -176,6 +185,9 @@ impl<'h> Predictor<'h> {
             out.slopes[i][GROWTH] = -1.0;
         }
         out.growth -= hypothesis.damping_per_s;
+        if !recorded {
+            self.steer(&seen, &gradient, at, out);
+        }
         if let Some(rate) = forced {
             let (turn, grow) = gradient.along(&rate);
             out.theta_rate += turn;
@@ -187,6 +199,45 @@ impl<'h> Predictor<'h> {
                 out.slopes[i][THETA_RATE] += turn;
                 out.slopes[i][GROWTH] += grow;
             }
+        }
+    }
+
+    /// What the loops do where nobody recorded it: forces along the pattern as it is read, as large as hold amplitude and
+    /// quadrature where they are seen to be, [v_as, v_qc] = M⁻¹ [ȧ/a − growth, Q̇ − widening] with growth and widening by
+    /// the mechanics alone, and what these forces turn the pattern by. The parts with ȧ/a and Q̇ are left to whoever walks
+    /// from sample to sample.
+    fn steer(&self, seen: &Envelope<f64>, gradient: &Gradient, at: &Moment<f64>, out: &mut Vibration) {
+        use quantity::{GROWTH, STEERING, THETA, THETA_RATE};
+        let still = ControlOutputs { v_as: 0.0, v_qc: 0.0 };
+        let axis = major_axis(seen, &seen.pendulum());
+        let unit = |now| {
+            let held = Commands { now, change_per_s: still, turn_rad_s: at.precession_rad_s };
+            self.loops.rate(&held, &axis, Jet::constant)
+        };
+        let energy = unit(ControlOutputs { v_as: 1.0, ..still });
+        let quadrature = part(&unit(ControlOutputs { v_qc: 1.0, ..still }), |j| j.value);
+        let along = part(&energy, |j| j.value);
+        let ((turn, grow), (turn_q, grow_q)) = (gradient.along(&along), gradient.along(&quadrature));
+        let (widen, widen_q) = (gradient.widening(&along), gradient.widening(&quadrature));
+        let determinant = grow * widen_q - grow_q * widen;
+        let by_growth = (turn * widen_q - turn_q * widen) / determinant;
+        let by_quadrature = (turn_q * grow - turn * grow_q) / determinant;
+        out.steering = [by_growth, by_quadrature];
+        for slope in &mut out.slopes {
+            slope[STEERING] = -slope[THETA];
+        }
+        for (lane, &i) in self.unknowns.forcing.columns.iter().enumerate() {
+            let (turned, grown) = gradient.along(&part(&energy, |j| j.slope[lane]));
+            out.slopes[i][STEERING] = (turned - by_growth * grown) / grow;
+        }
+        let widened: f64 =
+            self.mechanics.iter().map(|(id, v)| gradient.widening(&id.mechanics(v, &out.envelope))).sum();
+        out.theta_rate -= by_growth * out.growth + by_quadrature * widened;
+        for slope in &mut out.slopes {
+            slope[THETA_RATE] -= slope[STEERING] * out.growth + by_growth * slope[GROWTH];
+        }
+        for (i, id, unit) in &self.units {
+            out.slopes[*i][THETA_RATE] -= by_quadrature * gradient.widening(&id.mechanics(unit, &out.envelope));
         }
     }
 
@@ -244,6 +295,11 @@ fn constant_moment(at: &Moment<f64>) -> Moment<Jet> {
 struct Gradient {
     theta: Envelope<f64>,
     growth: Envelope<f64>,
+    quadrature: Envelope<f64>,
+}
+
+fn dot(g: &Envelope<f64>, d: &Envelope<f64>) -> f64 {
+    g.x_c * d.x_c + g.x_s * d.x_s + g.y_c * d.y_c + g.y_s * d.y_s
 }
 
 impl Gradient {
@@ -257,13 +313,18 @@ impl Gradient {
             k * (p.r * z.x_c + p.s * z.y_c),
             k * (p.r * z.x_s + p.s * z.y_s),
         );
-        Self { theta, growth: *z * (1.0 / p.e) }
+        let quadrature = Envelope::new(z.y_s, -z.y_c, -z.x_s, z.x_c) * 2.0;
+        Self { theta, growth: *z * (1.0 / p.e), quadrature }
     }
 
     /// (θ̇, ȧ/a) at the envelope's rate `d`.
     fn along(&self, d: &Envelope<f64>) -> (f64, f64) {
-        let dot = |g: &Envelope<f64>| g.x_c * d.x_c + g.x_s * d.x_s + g.y_c * d.y_c + g.y_s * d.y_s;
-        (dot(&self.theta), dot(&self.growth))
+        (dot(&self.theta, d), dot(&self.growth, d))
+    }
+
+    /// Q̇ at the envelope's rate `d`.
+    fn widening(&self, d: &Envelope<f64>) -> f64 {
+        dot(&self.quadrature, d)
     }
 }
 
@@ -275,6 +336,7 @@ impl Vibration {
             envelope: Envelope::new(0.0, 0.0, 0.0, 0.0),
             theta_rate: 0.0,
             growth: 0.0,
+            steering: [0.0; 2],
             slopes: Vec::new(),
         }
     }

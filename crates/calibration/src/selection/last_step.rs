@@ -56,7 +56,7 @@ fn refined(dataset: &mut Dataset, fitted: &Fitted) -> Option<Refined> {
         let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
         refine(&dataset.tracks, &Fit { unknowns, ..fitted.fit.clone() }, &priors)
     };
-    if !held && dataset.tracks_differ() {
+    if !held && dataset.tells_the_drive() {
         dataset.drive_is_free = true;
         if let Some(freed) = step(dataset).filter(|r| r.disagreement == 1.0) {
             return Some(freed);
