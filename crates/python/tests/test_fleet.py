@@ -111,6 +111,28 @@ def test_a_table_of_devices_is_answered_as_their_files_are(folders, lake, tmp_pa
         }
 
 
+def test_a_lake_goes_on_where_it_was_broken_off(lake, tmp_path, monkeypatch):
+    path, out = tmp_path / "lake.parquet", tmp_path / "answers.parquet"
+    pyarrow.parquet.write_table(lake, path)
+    assert fleet.names(path) == [f"unit-{n:02}" for n in range(DEVICES) if n != 3]
+    answer, asked = fleet.identify_in, []
+
+    def counted(lake, device, **options):
+        if len(asked) == 4:
+            raise KeyboardInterrupt
+        asked.append(device)
+        return answer(lake, device, **options)
+
+    monkeypatch.setattr(fleet, "identify_in", counted)
+    with pytest.raises(KeyboardInterrupt):
+        fleet.identify_lake(path, out)
+    assert pyarrow.parquet.read_table(out)["device"].to_pylist() == asked
+    monkeypatch.setattr(fleet, "identify_in", lambda *a, **o: asked.append(a[1]) or answer(*a, **o))
+    rows = fleet.identify_lake(path, out)
+    assert sorted(asked) == fleet.names(path), "each once"
+    assert rows.equals(pyarrow.parquet.read_table(out)) and rows.equals(fleet.identify_table(lake))
+
+
 def test_rows_that_cannot_be_one_device_are_a_row_that_says_so(lake):
     [row] = fleet.identify_device(lake).to_pylist()
     assert row["status"] == "refused" and "`device` has 11 values" in row["reason"]

@@ -13,10 +13,11 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from pyarrow import dataset, parquet
 
 from . import _cvg, identify
 from ._errors import InputError, NoAnswer
-from ._input import Run, is_path
+from ._input import Path, Run, is_path
 from ._report import Report
 
 #: the column that tells devices apart, and the one that tells the recordings of a device apart
@@ -127,6 +128,43 @@ def identify_table(table: pa.Table, **options: Any) -> pa.Table:
     """Answers every device in a table, which holds all rows of each: a row of `SCHEMA` for each."""
     rows = [identify_device(own, **options) for _, own in devices(table)]
     return pa.concat_tables(rows) if rows else SCHEMA.empty_table()
+
+
+def names(lake: Path) -> list[str]:
+    """The devices in a lake: a Parquet file, or a folder of them."""
+    column = dataset.dataset(lake).to_table(columns=[DEVICE])[DEVICE]
+    return sorted(str(device) for device in pc.unique(column).to_pylist())
+
+
+def identify_in(lake: Path, device: str, **options: Any) -> pa.Table:
+    """Answers one device of a lake, of which no other row is kept."""
+    return identify_device(dataset.dataset(lake).to_table(filter=pc.field(DEVICE) == device), **options)
+
+
+def identify_lake(lake: Path, out: Path, **options: Any) -> pa.Table:
+    """Answers every device of a lake into the Parquet file `out`, one after the other, and returns what is in it.
+
+    Devices that `out` has are kept: a run that was broken off goes on where it was. Answers of another version of `cvg`
+    are made anew; whether the lake is still the same is for the caller to know.
+    """
+    target = os.fspath(out)
+    rows = {row["device"][0].as_py(): row for row in _kept(target)}
+    for device in names(lake):
+        if device not in rows:
+            rows[device] = identify_in(lake, device, **options)
+            # a file that is whole or not there
+            parquet.write_table(pa.concat_tables(rows.values()), target + ".part")
+            os.replace(target + ".part", target)
+    return pa.concat_tables(rows.values()) if rows else SCHEMA.empty_table()
+
+
+def _kept(target: str) -> Iterator[pa.Table]:
+    if not os.path.exists(target):
+        return
+    table = parquet.read_table(target, schema=SCHEMA)
+    for at, report in enumerate(table["report"].to_pylist()):
+        if report is not None and json.loads(report)["tool"]["version"] == _cvg.__version__:
+            yield table.slice(at, 1)
 
 
 def population(rows: pa.Table | Iterable[pa.Table]) -> dict[str, Any]:
