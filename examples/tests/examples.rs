@@ -20,6 +20,21 @@ fn a_test_engineer_gets_a_verdict_and_a_compensated_recording() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn three_users_say_what_they_want_in_under_forty_lines() -> Result<()> {
+    for (name, program, expected) in [
+        ("columns_in_memory", env!("CARGO_BIN_EXE_columns_in_memory"), "Answered: "),
+        ("converter_loop", env!("CARGO_BIN_EXE_converter_loop"), " deg, at most "),
+        ("known_truth", env!("CARGO_BIN_EXE_known_truth"), "detection-cubic.kappa = 0.0100"),
+    ] {
+        let said = printed(program)?;
+        assert!(said.contains(expected), "{name}: {said}");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("src/bin/{name}.rs"));
+        assert!(fs::read_to_string(source)?.lines().count() < 40, "{name}");
+    }
+    Ok(())
+}
+
 /// What the readout's compensation cannot undo at 350 deg/s: anisodamping bends the angle by 14 mdeg there, the lag of the
 /// quadrature loop by 3 mdeg; noise has peaks of 4 mdeg.
 const OF_THE_MECHANICS_DEG: f64 = 0.022;

@@ -282,7 +282,8 @@ const fn located(name: &'static str, unit: &'static str, lower: f64, upper: f64,
 
 macro_rules! library {
     ($($name:ident => $effect:path),+ $(,)?) => {
-        /// An effect of the library.
+        /// An effect of the library, which grows.
+        #[non_exhaustive]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[allow(missing_docs, reason = "each variant is the effect of its name, documented in its own file")]
         pub enum EffectId {
