@@ -42,6 +42,7 @@ pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<
     if table.rows == 0 {
         return Err(nothing_usable(source, &dropped));
     }
+    integrate(&mut table, naming, &mut warnings);
     // Rows that were dropped may have held all that a column had.
     let without = |column: &NumberColumn| column.missing.count > 0 && column.values.iter().all(|value| value.is_nan());
     let bare = table.numbers.iter().filter(|column| without(column)).map(|column| column.channel).collect();
@@ -61,13 +62,15 @@ fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec
         let channel = column.channel;
         let own = table.units.iter().find(|(other, _)| *other == channel).map(|(_, unit)| unit.as_str());
         let by = if let Some(factor) = naming.factor(channel) {
-            if let Some(unit) = own.filter(|unit| units::conversion(channel, unit) != Some(Conversion::by(factor))) {
+            if let Some(unit) =
+                own.filter(|unit| units::conversion(naming.wanted(channel), unit) != Some(Conversion::by(factor)))
+            {
                 warnings
                     .push(format!("`{channel}` is said to be in {unit}; the factor {factor} of the mapping is taken"));
             }
             Conversion::by(factor)
         } else if let Some(unit) = own {
-            match units::conversion(channel, unit) {
+            match units::conversion(naming.wanted(channel), unit) {
                 Some(by) => by,
                 // a sensor's channels may be in any unit that both have
                 None if is_readout(channel) && is_one => {
@@ -76,7 +79,8 @@ fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec
                 }
                 None => {
                     let column = naming.column(channel).unwrap_or(channel.name()).to_owned();
-                    let (path, unit, wanted) = (source.to_path_buf(), unit.to_owned(), units::of_channel(channel));
+                    let (path, unit, wanted) =
+                        (source.to_path_buf(), unit.to_owned(), units::of_channel(naming.wanted(channel)));
                     return Err(ReadError::Unit { path, channel, unit, wanted, column });
                 }
             }
@@ -87,11 +91,29 @@ fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec
             continue;
         }
         if let (None, Some(unit)) = (naming.factor(channel), own.or(naming.unit(channel).map(|(unit, _)| unit))) {
-            warnings.push(format!("`{channel}` is in {unit} and taken to {}", units::of_channel(channel)));
+            warnings
+                .push(format!("`{channel}` is in {unit} and taken to {}", units::of_channel(naming.wanted(channel))));
         }
         column.values.iter_mut().for_each(|value| *value = by.of(*value));
     }
     Ok(())
+}
+
+/// Puts the integral over time, from zero on, in the place of rates that are mapped to an angle.
+fn integrate(table: &mut Table, naming: &Naming, warnings: &mut Vec<String>) {
+    let time = table.numbers.iter().find(|column| column.channel == Channel::Time).map(|column| column.values.clone());
+    for column in table.numbers.iter_mut().filter(|column| naming.is_integral(column.channel)) {
+        let mut angle = 0.0;
+        let mut before: Option<(f64, f64)> = None;
+        for (&t_s, value) in time.iter().flatten().zip(&mut column.values) {
+            let rate = *value;
+            angle += before.map_or(0.0, |(at, last)| 0.5 * (last + rate) * (t_s - at));
+            before = Some((t_s, rate));
+            *value = angle;
+        }
+        let name = naming.column(column.channel).unwrap_or_default();
+        warnings.push(format!("`{}` is the integral of `{name}` over time, from 0 on", column.channel));
+    }
 }
 
 /// A column without a single value is as good as absent; what is left must still be a recording.

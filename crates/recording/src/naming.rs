@@ -22,6 +22,8 @@ struct Entry {
     column: String,
     /// The factor that the mapping states, be it 1.
     scale: Option<f64>,
+    /// The column is a rate, and its integral over time the channel.
+    is_rate: bool,
 }
 
 impl Naming {
@@ -29,7 +31,8 @@ impl Naming {
     pub const NONE: &'static Self = &Self { entries: Vec::new() };
 
     /// Adds `CHANNEL=COLUMN`, `CHANNEL=COLUMN*FACTOR` or `CHANNEL=COLUMN/DIVISOR`, which takes the column's unit to the
-    /// channel's. A column whose own name ends like this is meant by `CHANNEL=COLUMN*1`.
+    /// channel's. A column whose own name ends like this is meant by `CHANNEL=COLUMN*1`. An angle may be the integral over
+    /// time of a rate in deg/s: `theta_deg=integral(COLUMN)`.
     ///
     /// # Errors
     /// What is wrong with it, and what would be right.
@@ -46,7 +49,14 @@ impl Naming {
             Some((&column[..at], if column[at..].starts_with('*') { number } else { number.recip() }))
         });
         let scale = factored.map(|(_, scale)| scale);
-        let column = factored.map_or(column, |(column, _)| column).trim().to_owned();
+        let column = factored.map_or(column, |(column, _)| column).trim();
+        let rate = column.strip_prefix("integral(").and_then(|rate| rate.strip_suffix(')')).map(str::trim);
+        if rate.is_some() && !matches!(channel, Channel::Theta | Channel::Table) {
+            return Err(format!(
+                "`{text}`: an integral over time is an angle; wanted theta_deg or table_deg before the `=`"
+            ));
+        }
+        let column = rate.unwrap_or(column).to_owned();
         if column.is_empty() {
             return Err(format!("`{text}` names no column; wanted CHANNEL=COLUMN, as in theta_deg=Ch3"));
         }
@@ -59,7 +69,7 @@ impl Naming {
         if self.entries.iter().any(|e| e.column.eq_ignore_ascii_case(&column)) {
             return Err(format!("`{column}` is mapped twice"));
         }
-        self.entries.push(Entry { channel, column, scale });
+        self.entries.push(Entry { channel, column, scale, is_rate: rate.is_some() });
         Ok(())
     }
 
@@ -107,10 +117,20 @@ impl Naming {
         self.entries.iter().find(|e| e.channel == channel).map(|e| e.column.as_str())
     }
 
+    /// Whether a channel is the integral over time of what its column holds.
+    pub(super) fn is_integral(&self, channel: Channel) -> bool {
+        self.entries.iter().any(|e| e.channel == channel && e.is_rate)
+    }
+
+    /// The channel in whose unit a column has to be.
+    pub(super) fn wanted(&self, channel: Channel) -> Channel {
+        if self.is_integral(channel) { Channel::Rate } else { channel }
+    }
+
     /// The unit that a mapped name ends with, and what takes it to the channel's; `None` where there is none that is known.
     pub(super) fn unit(&self, channel: Channel) -> Option<(&str, Conversion)> {
         let unit = units::in_brackets(self.column(channel)?)?;
-        Some((unit, units::conversion(channel, unit)?))
+        Some((unit, units::conversion(self.wanted(channel), unit)?))
     }
 }
 
@@ -131,6 +151,7 @@ mod tests {
             ("t_s=Time*-1", "factor"),
             ("xc_v=Ch1*0", "factor"),
             ("xc_v=Ch1/0", "factor"),
+            ("xc_v=integral(Ch1)", "an integral over time is an angle"),
         ] {
             assert!(naming.add(text).is_err_and(|e| e.contains(of)), "{text}: {:?}", naming.add(text));
         }

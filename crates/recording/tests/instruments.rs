@@ -153,3 +153,22 @@ fn a_file_without_our_names_is_refused_with_the_names_above_its_numbers() {
         assert!(said.contains(&format!("there are {names}")), "{said}");
     }
 }
+
+#[test]
+fn columns_between_blanks_are_refused_with_the_next_step() {
+    let said = refusal("t_us mag_x mag_y\n0 -132 -1728\n5000 -112 -1736\n", &[]);
+    assert!(said.contains("line 1: the columns are separated by blanks; wanted `,`, `;` or tabs"), "{said}");
+}
+
+#[test]
+fn a_rate_mapped_to_an_angle_is_integrated_over_the_rows_that_are_kept() {
+    let text = "Time (ms),Gyro (rad/s),Pos\n0,0,0\n500,1,1\n700,,1\n1000,1,2\n";
+    let entries = ["t_s=Time (ms)", "theta_deg=integral(Gyro (rad/s))", "table_deg=Pos"];
+    let recording = read(text, &entries).unwrap();
+    let turned = recording.theta_deg.as_deref().unwrap();
+    let wanted = [0.0, 0.25, 0.75].map(f64::to_degrees);
+    assert!(turned.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12) && turned.len() == 3, "{turned:?}");
+    assert_warns(&recording, "`theta_deg` is the integral of `Gyro (rad/s)` over time, from 0 on");
+    let negated = read(text, &[entries[0], "theta_deg=integral(Gyro (rad/s))*-1", entries[2]]).unwrap();
+    assert_eq!(negated.theta_deg.unwrap()[1], -0.25, "a factor is the user's own, in deg/s a unit");
+}

@@ -104,7 +104,7 @@ pub(super) fn read(reader: &mut impl BufRead, naming: &Naming, source: &Path) ->
         lines.pass();
     }
     let mut head = match comment {
-        Some((line, names)) => understand(&names, line, told, naming, source)?,
+        Some((line, names)) => understand(&names, line, None, told, naming, source)?,
         None => below_a_preamble(&mut lines, told, naming, source)?,
     };
     if let Some(units) = lines.peek(0)?.and_then(|line| beneath::units(&head, line)) {
@@ -130,7 +130,8 @@ fn below_a_preamble(
         preamble.read(&lines.pass().unwrap_or_default());
     }
     let header_line = lines.next;
-    let mut head = understand(&lines.pass().unwrap_or_default(), header_line, told, naming, source)?;
+    let header = lines.pass().unwrap_or_default();
+    let mut head = understand(&header, header_line, lines.peek(0)?, told, naming, source)?;
     if above > 0 {
         let last = header_line - 1;
         head.warnings.push(if first == last {
@@ -194,7 +195,21 @@ fn known(text: &[u8], separator: u8, naming: &Naming) -> usize {
     record.fields().filter(is_channel).count()
 }
 
-fn understand(text: &[u8], line: u64, told: Option<u8>, naming: &Naming, source: &Path) -> Result<Head, ReadError> {
+/// Whether a line is of so many numbers with nothing but blanks between them.
+fn separated_by_blanks(line: &[u8], count: usize) -> bool {
+    let text = String::from_utf8_lossy(line);
+    let numbers: Vec<Option<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    numbers.len() == count && numbers.iter().all(Option::is_some)
+}
+
+fn understand(
+    text: &[u8],
+    line: u64,
+    beneath: Option<&[u8]>,
+    told: Option<u8>,
+    naming: &Naming,
+    source: &Path,
+) -> Result<Head, ReadError> {
     let refuse = |what: String, wanted| Err(ReadError::Header { path: source.to_path_buf(), line, what, wanted });
     if text.trim_ascii().contains(&b'\r') {
         return refuse("the header holds carriage returns".to_owned(), "lines that end with LF or CRLF");
@@ -217,6 +232,14 @@ fn understand(text: &[u8], line: u64, told: Option<u8>, naming: &Naming, source:
     let is_number = |name: &String| name.trim().replace(',', ".").parse::<f64>().is_ok();
     if names.iter().all(is_number) {
         return refuse("the first line holds numbers".to_owned(), "a header line with the column names above them");
+    }
+    if let ([one], false) = (names.as_slice(), told.is_some()) {
+        let words: Vec<&str> = one.split_whitespace().collect();
+        // an instrument's names have no blanks in them where blanks separate its columns
+        if words.len() >= 3 && beneath.is_some_and(|row| separated_by_blanks(row, words.len())) {
+            let wanted = "`,`, `;` or tabs between them, as `tr -s ' ' ','` makes of blanks";
+            return refuse("the columns are separated by blanks".to_owned(), wanted);
+        }
     }
     let layout = Layout::new(&names, naming, source)?;
     let (read_ahead, units, warnings) = (vec![], vec![], vec![]);
