@@ -88,8 +88,23 @@ fn require_a_turn(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// An angle that hardly turns while its reference does is none of it: as a rule it is a rate.
+fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
+    let turned = |r: &&SensorRun| r.travel_rad();
+    let furthest = runs.iter().filter(|r| r.channels().is_none()).max_by(|a, b| turned(a).total_cmp(&turned(b)));
+    match furthest.filter(|r| r.travel_rad() * gain.abs() < std::f64::consts::PI) {
+        None => Ok(()),
+        Some(r) => Err(Refusal::no_answer(
+            &r.name,
+            format!("theta_deg does not follow the reference, which turns through {:.0}°", r.travel_rad().to_degrees()),
+            "the sensor's angle as theta_deg; of a rate in deg/s the integral is one: --map 'theta_deg=integral(COLUMN)'",
+        )),
+    }
+}
+
 fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
     let model = SensorModel::identify(stated, period, runs)?;
+    require_following(runs, model.sensor.gain)?;
     let thinned = thinned(runs);
     let deviations = deviations(&model, &thinned);
     let described = Described { model: &model, deviations: &deviations };
