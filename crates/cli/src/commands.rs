@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::Campaign;
+use cvg_calibration::recording::{Campaign, Instrument};
 use cvg_calibration::report::refused::{About, Refused};
 use cvg_calibration::{Answer, Cause, EffectText, Identification, Options};
 use cvg_model::effects::EffectId;
@@ -256,9 +256,16 @@ pub(crate) fn summary(identified: &Identification) -> String {
             .filter(|e| e.is_told())
             .map_or("not told by this campaign".to_owned(), |e| format!("{:.6} ± {:.1e}", e.value, e.half_width()))
     };
-    line(format!("  angular gain k              {}", estimate(&Some(r.angular_gain))));
-    line(format!("  detection gain G_Dy/G_Dx    {}", estimate(&r.detection_gain_ratio)));
-    line(format!("  actuation gain G_Ax/G_Ay    {}", estimate(&r.actuation_gain_ratio)));
+    if r.instrument == Instrument::Sensor.name() {
+        let k = r.angular_gain.value;
+        let told = if k == k.trunc() { pole_pairs(k) } else { estimate(&Some(r.angular_gain)) };
+        line(format!("  periods a turn              {told}"));
+        line(format!("  gain of Y over X            {}", estimate(&r.detection_gain_ratio)));
+    } else {
+        line(format!("  angular gain k              {}", estimate(&Some(r.angular_gain))));
+        line(format!("  detection gain G_Dy/G_Dx    {}", estimate(&r.detection_gain_ratio)));
+        line(format!("  actuation gain G_Ax/G_Ay    {}", estimate(&r.actuation_gain_ratio)));
+    }
     for e in &r.effects {
         let parameters = e.parameters.iter().map(|p| {
             let unit = if p.unit == "1" { "" } else { &p.unit };
@@ -279,6 +286,13 @@ pub(crate) fn summary(identified: &Identification) -> String {
         line(format!("  warning: {w}"));
     }
     s
+}
+
+/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn.
+fn pole_pairs(k: f64) -> String {
+    let sense = if k < 0.0 { "with the reference" } else { "reversed: against the reference" };
+    let pairs = if k.abs() == 1.0 { "1 period a turn".to_owned() } else { format!("{} pole pairs", k.abs()) };
+    format!("{k}: {pairs}, counting {sense}")
 }
 
 /// A value with some six significant digits.

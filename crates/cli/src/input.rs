@@ -194,11 +194,17 @@ pub(crate) fn explained(error: ReadError) -> Failure {
         return Failure::of_file(message, &error);
     }
     let known = |name: &str| Channel::ALL.iter().any(|c| c.name().eq_ignore_ascii_case(name));
-    let foreign = present.split('`').skip(1).step_by(2).find(|name| !known(name)).unwrap_or("Ch3");
-    let channel = if foreign.to_lowercase().starts_with('t') { "t_s" } else { "theta_deg" };
+    let foreign: Vec<&str> = present.split('`').skip(1).step_by(2).filter(|name| !known(name)).collect();
+    let is_time =
+        |name: &&&str| ["t", "clock", "sec", "date"].iter().any(|start| name.to_lowercase().starts_with(start));
+    // the first column is the time of nearly every file
+    let time = foreign.iter().find(is_time).or(foreign.first()).copied().unwrap_or("Time");
+    let (channel, column) =
+        if there("t_s") { ("theta_deg", foreign.first().copied().unwrap_or("Ch3")) } else { ("t_s", time) };
     let message = format!(
-        "{error}; say which column is which, as in --map '{channel}={foreign}', or once for all in the [columns] of a \
-         campaign.toml"
+        "{error}; say which column is which, as in --map '{channel}={column}', or once for all in the [columns] of a \
+         campaign.toml: t_s, the two channels xc_v and yc_v or an angle theta_deg, and the reference, table_deg or \
+         rate_dps, where there is one"
     );
     Failure::of_file(message, &error)
 }
