@@ -64,3 +64,8 @@ pub use report::calibration;
 pub use report::compensate::{compensate, left_out, outside};
 pub use selection::discovery;
 pub use survey::{Answer, Surveyed, answer};
+
+/// The page of the book on campaigns in memory, whose program is run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/src/in-memory.md")]
+struct InMemory;

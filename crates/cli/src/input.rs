@@ -195,8 +195,10 @@ pub(crate) fn explained(error: ReadError) -> Failure {
     }
     let known = |name: &str| Channel::ALL.iter().any(|c| c.name().eq_ignore_ascii_case(name));
     let foreign: Vec<&str> = present.split('`').skip(1).step_by(2).filter(|name| !known(name)).collect();
-    let is_time =
-        |name: &&&str| ["t", "clock", "sec", "date"].iter().any(|start| name.to_lowercase().starts_with(start));
+    let is_time = |name: &&&str| {
+        let name = name.to_lowercase();
+        name == "t" || ["t_", "t ", "time", "tick", "clock", "date"].iter().any(|start| name.starts_with(start))
+    };
     // the first column is the time of nearly every file
     let time = foreign.iter().find(is_time).or(foreign.first()).copied().unwrap_or("Time");
     let (channel, column) =
