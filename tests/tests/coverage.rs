@@ -197,7 +197,7 @@ fn intervals_hold_without_the_commands_of_the_loops() {
 fn intervals_hold_with_the_in_phase_channels_alone() {
     let without = ["vas_v", "vqc_v", "xs_v", "ys_v"];
     let answers =
-        all(trials(OTHER_TRIALS), |seed| Answer { corrected: Vec::new(), ..answer(3000 + seed, None, &without) });
+        all(trials(OTHER_TRIALS / 2), |seed| Answer { corrected: Vec::new(), ..answer(3000 + seed, None, &without) });
     let failures = failures(&answers, &[0, 2], 1.0);
     assert!(failures.is_empty(), "{failures:#?}");
     assert!(answers.iter().all(|a| a.estimates[1].is_none()));
