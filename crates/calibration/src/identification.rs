@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use crate::angle_sensor;
 use crate::carrier;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::{PlotContext, PlotData};
 use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
@@ -252,6 +253,7 @@ impl Found {
             fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
         };
         let runs = self.runs(head.runs, &mut warnings);
+        let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
             schema: SCHEMA.into(),
             status: Status::Answered,
@@ -270,7 +272,7 @@ impl Found {
             channels: channels_left,
             unexplained,
             runs,
-            decomposition: Vec::new(),
+            decomposition: shares(&self.errors.declared_on_fit, &amplitudes),
             proposals,
             scale_factor: self.scale_factor,
             allan: None,

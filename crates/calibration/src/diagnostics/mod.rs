@@ -4,6 +4,7 @@ pub mod allan;
 pub(crate) mod at_rest;
 pub(crate) mod decomposition;
 pub(crate) mod evaluate;
+pub(crate) mod influences;
 pub mod plots;
 pub(crate) mod residual;
 pub(crate) mod scale_factor;

@@ -139,6 +139,7 @@ fn steps(h: &mut String, identified: &Identification) {
 fn left(h: &mut String, r: &Report) {
     let memory = if r.residual.white { "no memory" } else { "some memory" };
     let _ = write!(h, "<h2 id=\"left\">What is left</h2><p>Ljung–Box at 1 %: {memory} in the residual.</p>");
+    shares(h, r);
     if r.unexplained.is_empty() {
         h.push_str("<p>Nothing that asks for an explanation.</p>");
     } else {
@@ -171,6 +172,19 @@ fn left(h: &mut String, r: &Report) {
             let amplitude = format!("{:.6}", x.amplitude_deg);
             let interval = format!("± {:.6}", x.ci95_deg);
             row(h, &[&of, &x.n.to_string(), &amplitude, &interval, &format!("{:.0}", x.phase_deg)]);
+        }
+    });
+}
+
+/// What the error that the declared model leaves is a function of.
+fn shares(h: &mut String, r: &Report) {
+    if r.decomposition.is_empty() {
+        return;
+    }
+    table(h, "What the declared model's residual follows", &["it follows", "share of its variance", "95 %"], |h| {
+        for s in &r.decomposition {
+            let [low, high] = s.ci95.map(|v| format!("{:.1} %", 100.0 * v));
+            row(h, &[&escape(&s.of), &format!("{:.1} %", 100.0 * s.share), &format!("{low} … {high}")]);
         }
     });
 }
