@@ -34,7 +34,7 @@ const FINALISTS: usize = 3;
 /// Isolated lines at most.
 const MOST_LINES: usize = 6;
 /// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
-const VARYING_RATE: f64 = 0.02;
+pub(crate) const VARYING_RATE: f64 = 0.02;
 
 /// A readout as it is fitted.
 pub(crate) type Front = (Kind, Weighting);
