@@ -47,7 +47,7 @@ pub(crate) struct Prepared {
     /// the part of them that is white
     pub(crate) white: Noise,
     pub(crate) starts: Vec<Start>,
-    /// commands that precess the pattern were not recorded: every segment may drift
+    /// what precesses the pattern was not all recorded, commands and quadrature: every segment may drift
     pub(crate) drifts: bool,
     /// residuals beyond this many rad (angle) or relative (amplitude) are set aside
     pub(crate) limit: Noise,

@@ -124,7 +124,9 @@ impl Dataset {
                 amplitude: if by_amplitude { motion.deviation.max(LEAST_NOISE) } else { f64::INFINITY },
             };
             let white = noise;
-            let drifts = instrument == Instrument::Gyroscope && !track.has_commands();
+            // what a split of the frequencies does to the pattern goes with a quadrature that nobody recorded
+            let recorded = track.has_commands() && track.has_quadrature();
+            let drifts = instrument == Instrument::Gyroscope && !recorded;
             prepared.push(Prepared { noise, white, limit, starts: motion.starts, drifts, track });
         }
         let weight: f64 = gains.iter().map(|g| g.1).sum();
@@ -255,9 +257,9 @@ impl Dataset {
         self.both_directions() || self.speeds_differ()
     }
 
-    /// Runs that differ, and commands or all that they hold, tell what the drive does.
+    /// Runs that differ tell what the drive does, where the quadrature tells the split of the frequencies from it.
     pub(crate) fn tells_the_drive(&self) -> bool {
-        self.tracks_differ() && self.tracks.iter().any(|p| p.track.has_commands() || p.track.has_quadrature())
+        self.tracks_differ() && self.tracks.iter().any(|p| p.track.has_quadrature())
     }
 
     /// Priors for the unknowns that the data may be silent about.

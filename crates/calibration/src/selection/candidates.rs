@@ -37,12 +37,11 @@ pub(crate) fn candidates(
     dense: &Evaluation,
 ) -> Vec<Candidate> {
     let sensor = dataset.instrument == Instrument::Sensor;
-    let commands = dataset.tracks.iter().any(|t| t.track.has_commands());
     let loops = dataset.tracks.iter().any(|t| t.track.has_commands() && t.track.has_quadrature());
     let mut out = Vec::new();
     for &id in EffectId::ALL.iter().chain(&dataset.written) {
         let d = id.description();
-        let unseen = (d.stage == Stage::Actuation && !commands) || (id.seen_by_loops() && !loops);
+        let unseen = (d.stage == Stage::Actuation || id.seen_by_loops()) && !loops;
         if d.declared || unseen || (sensor && !d.in_sensors) {
             continue;
         }
