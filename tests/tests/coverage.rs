@@ -26,8 +26,10 @@ const LEVEL: f64 = 1e-3;
 /// Half width of the angular gain's interval where a drift of 1e-3 rad/s may go unrecorded in each of several runs, the
 /// fastest at 500 deg/s: 1.96 · 1e-3 / 8.7, with room for the slower ones.
 const WIDEST_ANGULAR_GAIN: f64 = 5e-4;
-/// The share of campaigns that may give no answer in the long run; one in so many may claim an effect that is not there.
-const MOST_UNANSWERED: f64 = 0.1;
+/// One campaign in so many may give no answer, and one in so many may claim an effect that is not there. Where the actuation
+/// ratio is told by what the loops hold alone, more are under too strong a noise.
+const MOST_UNANSWERED: u64 = 10;
+const MOST_UNANSWERED_WITHOUT_COMMANDS: u64 = 5;
 const MOST_FALSE_CLAIMS: u64 = 100;
 /// Errors that are printed one by one, in standard deviations.
 const FAR: f64 = 3.0;
@@ -106,8 +108,8 @@ fn a_binomial_quantile_is_where_its_tail_says() {
 }
 
 /// Prints how often the intervals of some parameters hold the truth, and says which do so more rarely than 92 % or more
-/// often than `highest` in the long run could.
-fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<String> {
+/// often than `highest` in the long run could, or give no answer in more than one of `most_unanswered` campaigns.
+fn failures(answers: &[Answer], parameters: &[usize], highest: f64, most_unanswered: u64) -> Vec<String> {
     let count = answers.len() as u64;
     println!("{count} trials          held  share    width (median)   mean of z  its deviation   largest |z|");
     let mut failures = Vec::new();
@@ -132,7 +134,7 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
         let highest = if highest < 1.0 { binomial_quantile(told.len() as u64, highest, 1.0 - LEVEL) } else { count };
         // under strong noise an interval may be too wide to be an answer, now and then
         let unanswered = count - told.len() as u64;
-        if unanswered > binomial_quantile(count, MOST_UNANSWERED, 1.0 - LEVEL) {
+        if unanswered * most_unanswered > count {
             failures.push(format!("{name}: {unanswered} of {count} campaigns gave no answer"));
         }
         if !(lowest..=highest).contains(&held) {
@@ -167,7 +169,7 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64) -> Vec<Strin
 #[test]
 fn intervals_hold_the_truth_as_often_as_they_say() {
     let answers = all(trials(TRIALS), |seed| answer(seed, None, &[]));
-    let failures = failures(&answers, &[0, 1, 2], HIGHEST_COVERAGE);
+    let failures = failures(&answers, &[0, 1, 2], HIGHEST_COVERAGE, MOST_UNANSWERED);
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
@@ -175,7 +177,7 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
 #[test]
 fn intervals_hold_under_noise_that_remembers() {
     let answers = all(trials(OTHER_TRIALS), |seed| answer(1000 + seed, Some(Coloured::of(seed)), &[]));
-    let failures = failures(&answers, &[0, 1, 2], HIGHEST_COVERAGE);
+    let failures = failures(&answers, &[0, 1, 2], HIGHEST_COVERAGE, MOST_UNANSWERED);
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
@@ -185,7 +187,7 @@ fn intervals_hold_under_noise_that_remembers() {
 fn intervals_hold_without_the_commands_of_the_loops() {
     let without = ["vas_v", "vqc_v"];
     let answers = all(trials(OTHER_TRIALS), |seed| answer(2000 + seed, None, &without));
-    let failures = failures(&answers, &[0, 1, 2], 1.0);
+    let failures = failures(&answers, &[0, 1, 2], 1.0, MOST_UNANSWERED_WITHOUT_COMMANDS);
     assert!(failures.is_empty(), "{failures:#?}");
     let widest = answers.iter().filter_map(|a| a.estimates[2].map(|e| e.half_width())).fold(0.0, f64::max);
     assert!(widest < WIDEST_ANGULAR_GAIN, "± {widest:.1e}");
@@ -201,7 +203,7 @@ fn answers_without_quadrature(first_seed: u64, without: &[&str]) -> Vec<Answer> 
 #[test]
 fn intervals_hold_with_the_in_phase_channels_alone() {
     let answers = answers_without_quadrature(3000, &["vas_v", "vqc_v", "xs_v", "ys_v"]);
-    let failures = failures(&answers, &[0, 2], 1.0);
+    let failures = failures(&answers, &[0, 2], 1.0, MOST_UNANSWERED);
     assert!(failures.is_empty(), "{failures:#?}");
     assert!(answers.iter().all(|a| a.estimates[1].is_none()));
 }
@@ -210,7 +212,7 @@ fn intervals_hold_with_the_in_phase_channels_alone() {
 #[test]
 fn intervals_hold_without_the_quadrature_channels() {
     let answers = answers_without_quadrature(5000, &["xs_v", "ys_v"]);
-    let failures = failures(&answers, &[0, 1, 2], 1.0);
+    let failures = failures(&answers, &[0, 1, 2], 1.0, MOST_UNANSWERED);
     assert!(failures.is_empty(), "{failures:#?}");
 }
 

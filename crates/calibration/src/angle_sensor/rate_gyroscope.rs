@@ -43,8 +43,7 @@ const SUBSETS: [&[Term]; 6] = [
     &[Term::Bias, Term::Scale, Term::Lag],
 ];
 /// Offered besides where the lag cannot be told without some part of the runs, as without the one turn back of a
-/// recording. Electronics have a lag: where it can be told, bias and scale factor without it predict 2 % worse on the
-/// recordings that this was tried on.
+/// recording. Electronics have a lag: where it can be told, bias and scale factor are not tried without it.
 const WITHOUT_LAG: &[Term] = &[Term::Bias, Term::Scale];
 /// Parts of a run, each left out once.
 const PARTS: usize = 5;

@@ -165,6 +165,11 @@ impl Track {
         matches!(self.source, Source::Channels { quadrature: Some(_), .. })
     }
 
+    /// The loops' commands and the quadrature that they leave were recorded: all that precesses the pattern.
+    pub(crate) fn records_the_loops(&self) -> bool {
+        self.has_commands() && self.has_quadrature()
+    }
+
     /// Mean amplitude of the readout over what is used of the run, V.
     pub(crate) fn mean_amplitude(&self) -> f64 {
         let stride = (self.t_s.len() / 500).max(1);

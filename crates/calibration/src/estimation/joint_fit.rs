@@ -125,8 +125,7 @@ impl Dataset {
             };
             let white = noise;
             // what a split of the frequencies does to the pattern goes with a quadrature that nobody recorded
-            let recorded = track.has_commands() && track.has_quadrature();
-            let drifts = instrument == Instrument::Gyroscope && !recorded;
+            let drifts = instrument == Instrument::Gyroscope && !track.records_the_loops();
             prepared.push(Prepared { noise, white, limit, starts: motion.starts, drifts, track });
         }
         let weight: f64 = gains.iter().map(|g| g.1).sum();
@@ -326,8 +325,7 @@ impl Dataset {
     /// quadrature that is left.
     fn balance_quadrature(&mut self, hypothesis: &Hypothesis) {
         self.quadrature_balance = None;
-        let usable = |p: &Prepared| p.track.has_commands() && p.track.has_quadrature();
-        if hypothesis.force_scale == 0.0 || !self.tracks.iter().all(usable) {
+        if hypothesis.force_scale == 0.0 || !self.tracks.iter().all(|p| p.track.records_the_loops()) {
             return;
         }
         let none = Unknowns::new(hypothesis, Vec::new());

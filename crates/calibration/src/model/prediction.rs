@@ -118,7 +118,8 @@ impl<'h> Predictor<'h> {
         }
     }
 
-    /// One sample: the readout `seen`, the commands given then.
+    /// One sample: the readout `seen`, the commands given then; without them the precession by the loops is inferred from what
+    /// they hold, and growth is that without forces.
     pub(crate) fn predict(
         &self,
         seen: Envelope<f64>,

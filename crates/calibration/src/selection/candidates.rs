@@ -37,7 +37,7 @@ pub(crate) fn candidates(
     dense: &Evaluation,
 ) -> Vec<Candidate> {
     let sensor = dataset.instrument == Instrument::Sensor;
-    let loops = dataset.tracks.iter().any(|t| t.track.has_commands() && t.track.has_quadrature());
+    let loops = dataset.tracks.iter().any(|t| t.track.records_the_loops());
     let mut out = Vec::new();
     for &id in EffectId::ALL.iter().chain(&dataset.written) {
         let d = id.description();

@@ -178,7 +178,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
     let apart = Distinguishable {
         rates: dataset.tracks_differ(),
         speeds: dataset.speeds_differ(),
-        mechanics: dataset.tracks.iter().all(|t| t.track.has_commands() && t.track.has_quadrature()),
+        mechanics: dataset.tracks.iter().all(|t| t.track.records_the_loops()),
     };
     let balance_before = balance(dataset, &base);
     let heldout_before = heldout(dataset, &fitted.fit);
