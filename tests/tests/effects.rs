@@ -1,8 +1,8 @@
 //! The library of effects: what its descriptions promise, and that each effect can be undone. Their signatures are in
 //! `effect_signatures.rs`.
 
-use cvg_model::Envelope;
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Role, Shown, Stage};
+use cvg_model::{AxisForces, Envelope};
 use cvg_tests::domain::{angles, envelopes, sizes};
 use cvg_tests::effects::{line, values};
 use cvg_tests::for_each_scalar;
@@ -11,13 +11,14 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 18] = [
+const IDS: [&str; 19] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
     "detection-offset",
     "detection-cubic",
     "detection-saturation",
+    "drive-feedthrough",
     "actuation-gain-mismatch",
     "actuation-skew",
     "anisodamping",
@@ -134,9 +135,10 @@ for_each_scalar! {
         precession in -10.0..10.0_f64,
     ) {
         let ((e, e64), (f, _)) = (rounded_envelope::<T>(&e), rounded_envelope::<T>(&f));
-        let at = Moment { t_s: rounded(t_s).0, table_rad: rounded(turn).0, precession_rad_s: rounded(precession).0 };
+        let f = AxisForces { x_c: f.x_c, x_s: f.x_s, y_c: f.y_c, y_s: f.y_s };
+        let precession_rad_s = rounded(precession).0;
+        let at = Moment { t_s: rounded(t_s).0, table_rad: rounded(turn).0, precession_rad_s, drive: f };
         let rate = rounded::<T>(rate).0;
-        let f = cvg_model::AxisForces { x_c: f.x_c, x_s: f.x_s, y_c: f.y_c, y_s: f.y_s };
         for effect in EffectId::ALL {
             let neutral = effect.neutral::<T>();
             prop_assert_eq!(widened(&effect.read(&neutral, e, &at)), e64, "{}", effect);
@@ -175,7 +177,8 @@ for_each_scalar! {
     ) {
         let orbit = cvg_model::Orbit { a, q: a * q, theta, delta };
         let (e, e64) = rounded_envelope::<T>(&orbit.envelope());
-        let at = Moment { t_s: rounded(t_s).0, table_rad: T::from_f64(0.0), precession_rad_s: rounded(precession).0 };
+        let precession_rad_s = rounded(precession).0;
+        let at = Moment { t_s: rounded(t_s).0, precession_rad_s, ..Moment::default() };
         for effect in EffectId::ALL.iter().filter(|e| e.description().stage == Stage::Readout) {
             let mut v = effect.neutral::<T>();
             for ((v, p), size) in v.iter_mut().zip(effect.description().parameters).zip(sizes) {

@@ -212,7 +212,15 @@ fn evaluated(effect: EffectId) {
     for (i, a) in numbers.into_iter().enumerate() {
         let b = numbers[(3 * i + 1) % numbers.len()];
         let e = Envelope::new(a, b, 0.5, -a);
-        let (p, at) = ([b, a, 1.0, 0.0], Moment { t_s: a, table_rad: b, precession_rad_s: a });
+        let (p, at) = (
+            [b, a, 1.0, 0.0],
+            Moment {
+                t_s: a,
+                table_rad: b,
+                precession_rad_s: a,
+                drive: AxisForces { x_c: b, x_s: a, y_c: 0.5, y_s: b },
+            },
+        );
         let outputs = [effect.read(&p, e, &at), effect.unread(&p, e, &at), effect.mechanics(&p, &e)];
         let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b });
         let rate = effect.input_rate(&p, a, &at);

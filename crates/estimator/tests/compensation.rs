@@ -1,9 +1,8 @@
 //! The inverse of the readout: what `read` does, `unread` undoes, for every effect of the library.
 
 use cvg_estimator::Compensation;
-use cvg_model::Envelope;
-use cvg_model::Orbit;
 use cvg_model::effects::{EffectId, Inverse, Moment, Stage, Values};
+use cvg_model::{AxisForces, Envelope, Orbit};
 use proptest::prelude::*;
 
 fn readout_effects() -> Vec<EffectId> {
@@ -17,6 +16,7 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
         "detection-cubic" => [0.08 * u, 0.04 * v, 0.0, 0.0],
         "detection-skew" => [1.5 * u, 0.0, 0.0, 0.0],
         "detection-phase" => [0.4 * u, 0.0, 0.0, 0.0],
+        "drive-feedthrough" => unit.map(|u| 0.1 * u),
         "detection-gain-mismatch" => [1.0 + 0.4 * u, 0.0, 0.0, 0.0],
         "gain-drift" => [1e-3 * u, 0.0, 0.0, 0.0],
         "detection-offset" => [0.5 * u, 0.5 * v, 0.0, 0.0],
@@ -41,9 +41,10 @@ prop_compose! {
 }
 
 prop_compose! {
-    fn moment()(t_s in 0.0_f64..100.0, table_rad in -50.0_f64..50.0, precession_rad_s in -10.0_f64..10.0)
+    fn moment()(t_s in 0.0_f64..100.0, table_rad in -50.0_f64..50.0, precession_rad_s in -10.0_f64..10.0,
+        [x_c, x_s, y_c, y_s] in prop::array::uniform4(-1.0_f64..1.0))
         -> Moment<f64> {
-        Moment { t_s, table_rad, precession_rad_s }
+        Moment { t_s, table_rad, precession_rad_s, drive: AxisForces { x_c, x_s, y_c, y_s } }
     }
 }
 
@@ -176,7 +177,7 @@ fn a_chain_that_is_a_cubic_before_matrices_and_offsets_is_undone_without_the_mom
     let drift = (EffectId::GainDrift, [0.1, 0.0, 0.0, 0.0]);
     let late = (EffectId::AngleLatency, [0.01, 0.0, 0.0, 0.0]);
     let clip = (EffectId::DetectionSaturation, [1.2, 0.0, 0.0, 0.0]);
-    let at = Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4 };
+    let at = Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4, ..Moment::default() };
     let chains: [(&[_], bool); 11] = [
         (&[], true),
         (&[offset], true),

@@ -362,6 +362,18 @@ impl<T: Float> Instrument<T> {
         }
     }
 
+    /// The commands of a drive that [`Instrument::delayed`] gave.
+    fn undelayed(&self, drive: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
+        let more = correction_rad_s * self.delay_s;
+        let (cos, sin) = (self.delay_cos - self.delay_sin * more, self.delay_sin + self.delay_cos * more);
+        AxisForces {
+            x_c: drive.x_c * cos - drive.x_s * sin,
+            x_s: drive.x_s * cos + drive.x_c * sin,
+            y_c: drive.y_c * cos - drive.y_s * sin,
+            y_s: drive.y_s * cos + drive.y_c * sin,
+        }
+    }
+
     /// The moment of the window, for readout effects that depend on it.
     #[inline]
     fn moment(&self, state: &State<T>) -> Moment<T> {
@@ -370,6 +382,7 @@ impl<T: Float> Instrument<T> {
             t_s: T::zero(),
             table_rad: T::zero(),
             precession_rad_s: self.precession.rate_rad_s(&state.precession),
+            drive: self.undelayed(&state.drive, state.seen.correction_rad_s),
         }
     }
 }

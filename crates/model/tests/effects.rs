@@ -10,7 +10,8 @@ use cvg_model::{AxisForces, Envelope, Orbit, Real};
 const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 0.3 };
 
 fn now() -> Moment<f64> {
-    Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4 }
+    let drive = AxisForces { x_c: 0.3, x_s: -0.2, y_c: 0.1, y_s: 0.4 };
+    Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4, drive }
 }
 
 #[track_caller]
@@ -233,7 +234,7 @@ fn shift(id: EffectId, amplitude: f64, precession_rad_s: f64) -> f64 {
             *value += 0.1 * p.scale;
         }
     }
-    let at = Moment { t_s: 3.0, table_rad: 0.4, precession_rad_s };
+    let at = Moment { t_s: 3.0, table_rad: 0.4, precession_rad_s, ..Moment::default() };
     let angles = (0..24).map(|i| (f64::from(i) + 0.5) * core::f64::consts::PI / 24.0);
     let squares = angles.map(|theta| {
         let (sin, cos) = theta.sin_cos();
@@ -249,6 +250,8 @@ fn an_effect_scales_with_rate_and_amplitude_as_its_definition_does() {
     for &id in EffectId::ALL {
         let Description { stage, scaling, onsets, .. } = id.description();
         match stage {
+            // what it adds is that of the commands
+            Stage::Readout if id.on_commands() => {}
             // it turns no line: the quadrature that answers it does, with a split, as the mechanics turn it
             Stage::Readout if id == EffectId::DetectionPhase => assert_eq!(scaling.rate, -1, "{id}"),
             // what moves the pattern has the longer to do so the slower it turns
@@ -372,6 +375,7 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-gain-mismatch",
         "gain-drift",
         "detection-phase",
+        "drive-feedthrough",
         "detection-offset",
         "detection-saturation",
     ];
@@ -393,9 +397,36 @@ fn channels_of_unequal_lag_turn_their_phasors_apart_by_it() {
     reads(EffectId::DetectionPhase, [phase, 0.0, 0.0, 0.0], Envelope::new(x_c, x_s, y_c, y_s), 1e-15);
 }
 
+#[test]
+fn a_channel_reads_its_drive_by_a_complex_factor() {
+    // x_c − i x_s and f_c − i f_s
+    let of = |re: f64, im: f64, [c, s]: [f64; 2]| [re * c + im * s, re * s - im * c];
+    let f = now().drive;
+    let ([x_c, x_s], [y_c, y_s]) = (of(0.3, -0.2, [f.x_c, f.x_s]), of(0.05, 0.4, [f.y_c, f.y_s]));
+    let read = VIBRATION + Envelope::new(x_c, x_s, y_c, y_s);
+    reads(EffectId::DriveFeedthrough, [0.3, -0.2, 0.05, 0.4], read, 1e-15);
+    // an energy command through a real factor is a lag: in phase with what it takes energy from, nothing
+    let energy = Moment { drive: AxisForces { x_s: 1.0, ..AxisForces::default() }, ..now() };
+    let lagged = EffectId::DriveFeedthrough.read(&[0.3, 0.0, 0.0, 0.0], VIBRATION, &energy) - VIBRATION;
+    assert_near(lagged, Envelope::new(0.0, 0.3, 0.0, 0.0));
+}
+
+#[test]
+fn what_is_made_of_commands_says_so() {
+    let made: Vec<_> = EffectId::ALL.iter().filter(|id| id.on_commands()).collect();
+    assert_eq!(made, [&EffectId::DriveFeedthrough]);
+    for &id in EffectId::ALL.iter().filter(|id| !id.on_commands()) {
+        let values = id.description().parameters.iter().map(|p| p.neutral + p.scale);
+        let mut all: Values<f64> = id.neutral();
+        all.iter_mut().zip(values).for_each(|(v, value)| *v = value);
+        let still = Moment { drive: AxisForces::default(), ..now() };
+        assert_eq!(id.read(&all, VIBRATION, &now()), id.read(&all, VIBRATION, &still), "{id}");
+    }
+}
+
 /// What a loop nulls in its own channel shows in what it commands, and nowhere else.
 #[test]
 fn a_lag_between_the_channels_alone_is_seen_by_the_loops_alone() {
     let seen: Vec<_> = EffectId::ALL.iter().filter(|id| id.seen_by_loops()).collect();
-    assert_eq!(seen, [&EffectId::DetectionPhase]);
+    assert_eq!(seen, [&EffectId::DetectionPhase, &EffectId::DriveFeedthrough]);
 }

@@ -62,6 +62,7 @@ fn moments() -> [Moment<f64>; 3] {
         t_s,
         table_rad,
         precession_rad_s,
+        drive: AxisForces { x_c: 0.25, x_s: -0.5, y_c: 0.125, y_s: 0.75 },
     })
 }
 
@@ -72,11 +73,7 @@ fn what_is_read_and_undone_is_that_of_double_precision() {
             let in_single = values.map(|v| v as f32);
             let values = in_single.map(f64::from);
             for at in moments() {
-                let now = Moment {
-                    t_s: at.t_s as f32,
-                    table_rad: at.table_rad as f32,
-                    precession_rad_s: at.precession_rad_s as f32,
-                };
+                let now = at.map(|v| v as f32);
                 for e in vibrations() {
                     let e = double(&single(&e));
                     let read = id.read(&values, e, &at);
@@ -117,11 +114,7 @@ fn what_is_moved_pushed_and_turned_is_that_of_double_precision() {
             }
             for at in moments() {
                 for rate in [3.0, -0.5, 0.0] {
-                    let now = Moment {
-                        t_s: at.t_s as f32,
-                        table_rad: at.table_rad as f32,
-                        precession_rad_s: at.precession_rad_s as f32,
-                    };
+                    let now = at.map(|v| v as f32);
                     let got = id.input_rate(&in_single, rate as f32, &now);
                     let expected = id.input_rate(&values, rate, &at);
                     assert!((f64::from(got) - expected).abs() < 2e-6 * (1.0 + expected.abs()), "{id}: {got}");

@@ -119,6 +119,8 @@ pub struct ClosedLoop {
     tick: i64,
     table_rad: f64,
     vibration: Envelope<f64>,
+    /// what the drives were commanded to with the last sample, V
+    drive: AxisForces<f64>,
     energy_state: PiState<f64>,
     quadrature_state: PiState<f64>,
     rate_state: PiState<f64>,
@@ -197,6 +199,7 @@ impl ClosedLoop {
             tick: 0_i64.saturating_sub_unsigned(course.warm_up_samples),
             table_rad: 0.0,
             vibration,
+            drive: AxisForces::default(),
             energy_state: design.energy.primed(hold_command),
             quadrature_state: PiState::default(),
             rate_state: PiState::default(),
@@ -260,6 +263,7 @@ impl ClosedLoop {
         let at = self.moment();
         let drive = self.electronics(&at);
         self.advance(&at, &drive);
+        self.drive = drive;
         self.sample += 1;
         self.tick += 1;
     }
@@ -372,6 +376,7 @@ impl ClosedLoop {
             t_s,
             table_rad: self.table_rad,
             precession_rad_s: -self.design.resonator.angular_gain * self.leg.rate_rad_s,
+            drive: self.drive,
         }
     }
 

@@ -51,7 +51,7 @@ impl Sensor {
             let rate_rad_s = self.legs.iter().rev().find(|(from, _)| *from <= k).map_or(0.0, |(_, rate)| *rate);
             #[allow(clippy::cast_precision_loss, reason = "2^53 samples are not reached")]
             let t_s = k as f64 * self.period_s;
-            let at = Moment { t_s, table_rad, precession_rad_s: -self.angular_gain * rate_rad_s };
+            let at = Moment { t_s, table_rad, precession_rad_s: -self.angular_gain * rate_rad_s, ..Moment::default() };
             if k % every == 0 {
                 let (sin, cos) = (self.start_rad - self.angular_gain * turned_rad).sin_cos();
                 let a = self.amplitude_v;

@@ -147,6 +147,24 @@ fn detection_phase_turns_the_pattern_through_a_split_at_4_theta() {
 }
 
 #[test]
+fn drive_feedthrough_is_a_share_of_the_commands() {
+    let split = r#"{ id = "anisoelasticity", anisoelasticity = 0.25, theta_omega = 22.5 }"#;
+    for rate in [100.0, -50.0] {
+        let second = |effects: &str| angle_harmonics(&rotation(effects, rate, 40.0), &[2.0, 4.0])[0];
+        // across the pattern in phase: the quadrature command, at 2θ through the split
+        let alike = r#"{ id = "drive-feedthrough", x_in_phase = 5e-3, y_in_phase = 5e-3 }"#;
+        let both = format!("{split}, {alike}");
+        let (fed, alone, run) = (second(&both), second(split), rotation(&both, rate, 40.0));
+        let command = fit(column(&run, "vqc_v"), &[], &angles(&run, Period::Pattern), &[2.0]).1[0];
+        close(fed.sin - alone.sin, 5e-3 * command.sin);
+        close(fed.cos - alone.cos, 5e-3 * command.cos);
+        // along the pattern in phase: the energy command, which holds against the damping, as a mismatch of the gains
+        let unlike = r#"{ id = "drive-feedthrough", x_quadrature = 0.01, y_quadrature = -0.03 }"#;
+        close(second(unlike).sin, 0.5 / 22.0 * (0.01 + 0.03));
+    }
+}
+
+#[test]
 fn spring_cubic_is_a_fourth_harmonic_that_shrinks_with_the_rate() {
     for rate in [500.0, 100.0, -100.0] {
         let run = rotation(r#"{ id = "spring-cubic", p = 0.02, phase = 30.0 }"#, rate, 20.0);

@@ -4,7 +4,9 @@
 
 use std::ops::Range;
 
-use cvg_model::{ControlOutputs, Envelope};
+use cvg_estimator::direction::{Direction, major_axis};
+use cvg_model::effects::Moment;
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope};
 use rayon::prelude::*;
 
 use crate::data::agreement::LARGEST_SPLIT_RAD_S;
@@ -147,6 +149,20 @@ impl Track {
         })
     }
 
+    /// The instant of sample `i` while the pattern precesses nominally at `precession_rad_s`, for effects that are not made
+    /// of commands.
+    #[inline]
+    pub(crate) fn instant(&self, i: usize, precession_rad_s: f64) -> Moment<f64> {
+        Moment { t_s: self.t_s[i], table_rad: self.input_rad[i], precession_rad_s, ..Moment::default() }
+    }
+
+    /// The same with what the electronics commanded the drives to, where that was recorded.
+    pub(crate) fn moment(&self, i: usize, precession_rad_s: f64) -> Moment<f64> {
+        let at = self.instant(i, precession_rad_s);
+        let Some([v_as, v_qc]) = &self.commands else { return at };
+        Moment { drive: commanded(&self.envelope(i), &ControlOutputs { v_as: v_as[i], v_qc: v_qc[i] }), ..at }
+    }
+
     /// How fast the pattern turned around sample `i`, as it was read, rad/s: less than a quarter turn between samples.
     fn turn(&self, i: usize) -> f64 {
         let (from, to) = (i.saturating_sub(1), (i + 1).min(self.t_s.len() - 1));
@@ -242,6 +258,12 @@ impl Track {
             _ => 0.0,
         }
     }
+}
+
+/// What the drives of X and Y are commanded to where the electronics read `seen`, V.
+pub(crate) fn commanded(seen: &Envelope<f64>, v: &ControlOutputs<f64>) -> AxisForces<f64> {
+    let Direction { cos, sin, .. } = major_axis(seen, &seen.pendulum());
+    ActuationGains { x: 1.0, y: 1.0 }.axis_forces_along(v, cos, sin)
 }
 
 /// max − min

@@ -1,7 +1,7 @@
 //! What a person wants to see of an identification: the curves behind the figures of a report, thinned to what a screen
 //! can show. Facts only; nothing is rendered, and nothing here feeds back into an answer.
 
-use cvg_model::effects::{EffectId, Moment, Scaling};
+use cvg_model::effects::{EffectId, Scaling};
 use nalgebra::DMatrix;
 
 use crate::data::track::wrapped;
@@ -327,7 +327,7 @@ impl PlotContext<'_> {
             let seen = track.envelope(i);
             let commands = track.commands(i, stride)?;
             let rate = track.rate(i);
-            let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: h.precession(rate) };
+            let at = track.moment(i, h.precession(rate));
             predictor.predict(seen, Some(commands), &at, &mut with);
             predictor.predict(seen, None, &at, &mut without);
             let push = with.growth - without.growth;

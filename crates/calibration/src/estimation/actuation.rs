@@ -3,11 +3,12 @@
 //! With the pattern held at an angle the energy loop is on, then off. Off, the amplitude decays at the damping of that
 //! direction; on, the command replaces just that loss. The two together give the drive's gain in that direction.
 
+use cvg_model::ControlOutputs;
 pub use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::effects::Moment;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::data::track::wrapped;
+use crate::data::track::{commanded, wrapped};
 use crate::error::Refusal;
 use crate::estimation::statistics::{line, robust_deviation};
 use crate::model::hypothesis::Hypothesis;
@@ -61,7 +62,10 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     let sample = |i: usize| {
         let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
         let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
-        hypothesis.unread(seen, &Moment { t_s: r.t_s[i], table_rad: 0.0, precession_rad_s: 0.0 })
+        // commands that are missing in a row move nothing there
+        let command = |v: Option<&Vec<f64>>| v.map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
+        let commands = ControlOutputs { v_as: command(Some(v_as)), v_qc: command(r.vqc_v.as_ref()) };
+        hypothesis.unread(seen, &Moment { t_s: r.t_s[i], drive: commanded(&seen, &commands), ..Moment::default() })
     };
     let mut off_angle = Vec::new();
     let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new()));

@@ -2,8 +2,6 @@
 //!
 //! From here on residuals are small against the period, so no angle is ever unwrapped against its neighbour again.
 
-use cvg_model::effects::Moment;
-
 use crate::data::agreement::Gain;
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
@@ -45,10 +43,7 @@ pub(crate) fn bearings(track: &Track, hypothesis: &Hypothesis, stride: usize) ->
             s.range
                 .clone()
                 .step_by(stride)
-                .map(|i| {
-                    let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: 0.0 };
-                    hypothesis.bearing(&hypothesis.unread(track.envelope(i), &at))
-                })
+                .map(|i| hypothesis.bearing(&hypothesis.unread(track.envelope(i), &track.moment(i, 0.0))))
                 .collect()
         })
         .collect()
@@ -84,10 +79,7 @@ fn mean_ln_amplitude(track: &Track, segment: &crate::data::track::Segment, hypot
         .range
         .clone()
         .step_by(stride)
-        .map(|i| {
-            let at = Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: 0.0 };
-            0.5 * hypothesis.unread(track.envelope(i), &at).pendulum().e.ln()
-        })
+        .map(|i| 0.5 * hypothesis.unread(track.envelope(i), &track.moment(i, 0.0)).pendulum().e.ln())
         .collect();
     median(&mut values)
 }

@@ -29,6 +29,8 @@ pub mod belief {
     pub const DAMPING_PER_S: f64 = 0.06;
     /// control latency, s
     pub const CONTROL_LATENCY_S: f64 = 2e-3;
+    /// what the drives feed through to the readout, as a share of the amplitude
+    pub const FEEDTHROUGH: f64 = 0.02;
     /// the energy command cannot change the amplitude faster than this, 1/s
     pub const FORCING_PER_S: f64 = 3.0;
 }
@@ -281,9 +283,13 @@ impl Dataset {
                 .map_or((0.0, belief::ANISOELASTICITY_RAD_S), |(w, deviation)| (w[p], deviation));
             effect(EffectId::Anisoelasticity, p, mean, deviation);
         }
+        let commanded = self.command_rms[0].hypot(self.command_rms[1]).max(1e-9);
+        for p in 0..EffectId::DriveFeedthrough.description().parameters.len() {
+            effect(EffectId::DriveFeedthrough, p, 0.0, belief::FEEDTHROUGH / commanded);
+        }
         let ratio = drive.map_or((1.0, belief::ACTUATION_RATIO), |d| (d.ratio(), d.ratio() * d.ratio_error.max(1e-6)));
         effect(EffectId::ActuationGainMismatch, 0, ratio.0, ratio.1);
-        let silent = (0.0, belief::FORCING_PER_S / self.command_rms[0].hypot(self.command_rms[1]).max(1e-9));
+        let silent = (0.0, belief::FORCING_PER_S / commanded);
         let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };
         let balance = self.energy_balance.map(|(scale, deviation)| (scale, deviation.max(share * scale)));
         let scale = drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(balance).unwrap_or(silent);

@@ -96,6 +96,7 @@ pub(crate) fn propagate(
     let (mut angle_slopes, mut amplitude_slopes) = (vec![0.0; n], vec![0.0; n]);
     let sense = hypothesis.sense();
     let harmonic = hypothesis.input_harmonic();
+    let moment = if hypothesis.reads_commands() { Track::moment } else { Track::instant };
     let zero_input = track.input_rad[segment.range.start];
     if harmonic > 0.0 {
         let before: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
@@ -107,8 +108,7 @@ pub(crate) fn propagate(
     let mut passed_over = 0;
     for i in segment.range.clone().step_by(stride) {
         let rate = track.rate(i);
-        let at =
-            Moment { t_s: track.t_s[i], table_rad: track.input_rad[i], precession_rad_s: hypothesis.precession(rate) };
+        let at = moment(track, i, hypothesis.precession(rate));
         predictor.predict(track.envelope(i), track.commands(i, stride), &at, &mut vibration);
         if hypothesis.instrument == Instrument::Gyroscope {
             integrands[0] = vibration.theta_rate;
@@ -193,6 +193,7 @@ fn excess_angle(
                 t_s: t0 + s * (t1 - t0),
                 table_rad: a0 + s * (a1 - a0) + excess + 0.5 * h * (t1 - t0) * sum.value,
                 precession_rad_s: predictor.hypothesis.precession(rate),
+                ..Moment::default()
             };
             sum = sum + predictor.excess_rate(rate, &at);
         }

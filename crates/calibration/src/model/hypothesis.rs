@@ -200,6 +200,11 @@ impl Hypothesis {
         self.members.iter().enumerate().filter(move |(_, m)| m.id.description().stage == stage)
     }
 
+    /// A readout effect is made of the drives' commands.
+    pub(crate) fn reads_commands(&self) -> bool {
+        self.acting(Stage::Readout).any(|(_, m)| m.id.on_commands())
+    }
+
     /// The vibration behind a readout: the members' readout effects undone, last first. A table stands between those of the
     /// channels and those of the angle: it repeats with the angle that was read, and that may be late.
     pub fn unread(&self, e: Envelope<f64>, at: &Moment<f64>) -> Envelope<f64> {

@@ -127,12 +127,13 @@ impl Real for Jet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cvg_model::Envelope;
     use cvg_model::effects::{EffectId, Moment, Stage, Values};
+    use cvg_model::{AxisForces, Envelope};
 
     #[test]
     fn slopes_of_every_readout_effect_are_those_of_finite_differences() {
-        let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8 };
+        let drive = AxisForces { x_c: 0.2, x_s: 0.1, y_c: -0.3, y_s: 0.05 };
+        let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, drive };
         let z = Envelope::new(0.7, 0.01, -0.6, -0.02);
         for &id in EffectId::ALL.iter().filter(|e| e.description().stage == Stage::Readout) {
             let parameters = id.description().parameters;
@@ -144,11 +145,7 @@ mod tests {
             let lift = |e: Envelope<f64>| {
                 Envelope::new(Jet::constant(e.x_c), Jet::constant(e.x_s), Jet::constant(e.y_c), Jet::constant(e.y_s))
             };
-            let at_jet = Moment {
-                t_s: Jet::constant(at.t_s),
-                table_rad: Jet::constant(at.table_rad),
-                precession_rad_s: Jet::constant(at.precession_rad_s),
-            };
+            let at_jet = at.map(Jet::constant);
             let exact = id.unread(&jets, lift(z), &at_jet).y_c;
             for (i, p) in parameters.iter().enumerate() {
                 let h = 1e-4 * p.scale;

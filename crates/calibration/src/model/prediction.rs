@@ -152,7 +152,7 @@ impl<'h> Predictor<'h> {
             out.theta = hypothesis.bearing(&z);
         }
         for (chain, lanes) in self.readout.iter().zip(&unknowns.readout) {
-            let moment = constant_moment(at);
+            let moment = at.map(Jet::constant);
             let jets = chain.iter().fold(lifted(&seen), |e, (id, values)| id.unread(values, e, &moment));
             let theta = hypothesis.bearing(&jets);
             let energy = jets.pendulum().e;
@@ -250,7 +250,7 @@ impl<'h> Predictor<'h> {
 
     /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes.
     pub(crate) fn excess_rate(&self, rate_rad_s: f64, at: &Moment<f64>) -> Jet {
-        let (at, nominal) = (constant_moment(at), Jet::constant(rate_rad_s));
+        let (at, nominal) = (at.map(Jet::constant), Jet::constant(rate_rad_s));
         self.input.iter().fold(nominal, |rate, (id, values)| id.input_rate(values, rate, &at)) - nominal
     }
 }
@@ -282,14 +282,6 @@ fn part(e: &Envelope<Jet>, of: impl Fn(Jet) -> f64) -> Envelope<f64> {
 #[inline]
 fn lifted(e: &Envelope<f64>) -> Envelope<Jet> {
     Envelope::new(Jet::constant(e.x_c), Jet::constant(e.x_s), Jet::constant(e.y_c), Jet::constant(e.y_s))
-}
-
-fn constant_moment(at: &Moment<f64>) -> Moment<Jet> {
-    Moment {
-        t_s: Jet::constant(at.t_s),
-        table_rad: Jet::constant(at.table_rad),
-        precession_rad_s: Jet::constant(at.precession_rad_s),
-    }
 }
 
 /// How the pattern angle and ln of the amplitude change with the envelope: linear in its rate of change.

@@ -1,7 +1,7 @@
 //! A recording with the identified errors taken out: readouts are undone, precession that the mechanics and the
 //! commands add is turned back, and a reference that the table did not keep is corrected.
 
-use cvg_model::effects::{EffectId, Moment, Stage};
+use cvg_model::effects::{EffectId, Stage};
 
 use crate::data::track::{Track, wrapped};
 use crate::error::Refusal;
@@ -57,11 +57,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     for segment in &track.segments {
         propagate(&track, segment, h, &none, Start::default(), Stepping::every(1), |row| {
             let i = row.index;
-            let at = Moment {
-                t_s: track.t_s[i],
-                table_rad: track.input_rad[i],
-                precession_rad_s: h.precession(track.rate(i)),
-            };
+            let at = track.moment(i, h.precession(track.rate(i)));
             let seen = track.envelope(i);
             let (sin, cos) = (-row.drift).sin_cos();
             let z = h.unread(seen, &at).turned(sin, cos);

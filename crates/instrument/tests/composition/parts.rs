@@ -140,7 +140,10 @@ impl<T: Float> Parts<T> {
         let clipped = measured.clipped > 0;
         let mut valid = measured.status == Measured::Valid;
         let rate = self.precession.rate_rad_s(&s.precession);
-        let at = Moment { t_s: T::zero(), table_rad: T::zero(), precession_rad_s: rate };
+        let zero = T::zero();
+        // none of the effects here is made of commands
+        let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
+        let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: rate, drive };
         s.fingerprint = now;
         s.seen.readout = measured.envelope;
         s.seen.compensated = match &self.readout {

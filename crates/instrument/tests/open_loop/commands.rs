@@ -2,8 +2,9 @@
 
 use core::f64::consts::PI;
 
-use cvg_instrument::{Mode, Settings, Wish};
-use cvg_model::Float;
+use cvg_instrument::{Instrument, Mode, Settings, Wish};
+use cvg_model::effects::{EffectId, Values};
+use cvg_model::{Envelope, Float};
 
 use super::Bench;
 
@@ -69,6 +70,42 @@ fn what_is_commanded_is_what_acts<T: Float>() {
     }
 }
 
+/// Factors of the feed-through of X and Y.
+const FED: &[(EffectId, Values<f64>)] = &[(EffectId::DriveFeedthrough, [0.03, -0.02, -0.01, 0.05])];
+
+fn what_the_drives_feed_through_is_taken_out_of_the_readout<T: Float>() {
+    for theta in [0.3, 1.9, -0.3, -1.9] {
+        let mut bench = Bench::<T>::running(theta, 0.0);
+        bench.instrument = Instrument::new(&Settings { readout: FED, ..bench.settings }).expect("inside its domain");
+        bench.state.energy = cvg_controller::PiState::default();
+        bench.state.quadrature.integral = T::ratio(1, 10);
+        bench.amplitude_v = 1.02;
+        bench.windows(1);
+        // what acts while the next window is read, in Equation 9's frame
+        let commands = bench.state.seen;
+        let (v_as, v_qc) = (commands.v_as.to_f64(), commands.v_qc.to_f64());
+        assert!(v_as > 0.05 && v_qc.abs() > 0.05, "{v_as} {v_qc}");
+        bench.windows(1);
+        let seen = bench.state.seen;
+        // the electronics take the pattern for one that lies there, or half a turn on
+        let direction = (seen.compensated.x_c.to_f64() * theta.cos()).signum();
+        let (sin, cos) = (direction * theta.sin(), direction * theta.cos());
+        let [f_xc, f_xs, f_yc, f_ys] = [-v_qc * sin, v_as * cos, v_qc * cos, v_as * sin];
+        let [x_re, x_im, y_re, y_im] = FED[0].1;
+        let fed = Envelope::new(
+            x_re * f_xc + x_im * f_xs,
+            x_re * f_xs - x_im * f_xc,
+            y_re * f_yc + y_im * f_ys,
+            y_re * f_ys - y_im * f_yc,
+        );
+        let (r, c) = (seen.readout, seen.compensated);
+        let taken = [(r.x_c, c.x_c), (r.x_s, c.x_s), (r.y_c, c.y_c), (r.y_s, c.y_s)].map(|(r, c)| (r - c).to_f64());
+        for (taken, fed) in taken.into_iter().zip([fed.x_c, fed.x_s, fed.y_c, fed.y_s]) {
+            assert!((taken - fed).abs() < 1e-4, "{theta}: {taken} of {fed}");
+        }
+    }
+}
+
 fn a_hold_integrates<T: Float>() {
     for (theta, sense) in [(0.01, 1.0), (-0.01, -1.0)] {
         let mut bench = Bench::<T>::with(Settings::default());
@@ -115,6 +152,7 @@ in_both_precisions! {
     the_quadrature_loop_acts_across_the_pattern_and_in_phase what_is_commanded_is_what_acts;
     a_pattern_beside_its_heading_is_pushed_more_and_more a_hold_integrates;
     a_resonance_beside_its_nominal_frequency_is_found a_detuning_is_found;
+    the_drives_are_taken_out_of_the_readout what_the_drives_feed_through_is_taken_out_of_the_readout;
 }
 
 #[test]

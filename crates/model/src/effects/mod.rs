@@ -22,6 +22,7 @@ pub mod detection_offset;
 pub mod detection_phase;
 pub mod detection_saturation;
 pub mod detection_skew;
+pub mod drive_feedthrough;
 pub mod gain_drift;
 pub mod harmonic_n;
 pub mod rate_offset;
@@ -62,6 +63,22 @@ pub struct Moment<T> {
     pub table_rad: T,
     /// nominal precession rate −kΩ, rad/s
     pub precession_rad_s: T,
+    /// what the electronics command the drives of X and Y to, V: what acts while the readout is taken
+    pub drive: AxisForces<T>,
+}
+
+impl<T: Copy> Moment<T> {
+    /// The same instant in another scalar.
+    #[inline]
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Moment<U> {
+        let d = &self.drive;
+        Moment {
+            t_s: f(self.t_s),
+            table_rad: f(self.table_rad),
+            precession_rad_s: f(self.precession_rad_s),
+            drive: AxisForces { x_c: f(d.x_c), x_s: f(d.x_s), y_c: f(d.y_c), y_s: f(d.y_s) },
+        }
+    }
 }
 
 /// One parameter of an effect.
@@ -213,6 +230,9 @@ pub trait Effect {
     /// It is seen in what the loops answer to it: nothing tells it without the quadrature and the commands.
     const SEEN_BY_LOOPS: bool = false;
 
+    /// It is made of the drives' commands: [`Moment::drive`].
+    const ON_COMMANDS: bool = false;
+
     /// Input rate that reaches the resonator, rad/s, when the table turns at `rate_rad_s`.
     #[inline]
     fn input_rate<T: Real>(_: &Values<T>, rate_rad_s: T, _: &Moment<T>) -> T {
@@ -324,6 +344,15 @@ macro_rules! library {
                     $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS },)+
                     #[cfg(feature = "written")]
                     Self::WrittenFirst(_) | Self::Written(_) => false,
+                }
+            }
+
+            /// [`Effect::ON_COMMANDS`]
+            pub const fn on_commands(self) -> bool {
+                match self {
+                    $(Self::$name => const { <$effect as Effect>::ON_COMMANDS },)+
+                    #[cfg(feature = "written")]
+                    Self::WrittenFirst(text) | Self::Written(text) => text.on_commands,
                 }
             }
 
@@ -445,6 +474,7 @@ library! {
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,
     DetectionPhase => detection_phase::DetectionPhase,
+    DriveFeedthrough => drive_feedthrough::DriveFeedthrough,
     DetectionOffset => detection_offset::DetectionOffset,
     DetectionSaturation => detection_saturation::DetectionSaturation,
 }

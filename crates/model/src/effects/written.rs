@@ -51,6 +51,26 @@ pub enum Variable {
     Table,
     /// nominal precession rate −kΩ, rad/s
     Precession,
+    /// F_x = f_xc − i f_xs, what the drive of X is commanded to, V
+    DriveX,
+    /// F_y
+    DriveY,
+    /// in-phase part of F_x
+    DriveXc,
+    /// quadrature part of F_x
+    DriveXs,
+    /// in-phase part of F_y
+    DriveYc,
+    /// quadrature part of F_y
+    DriveYs,
+}
+
+impl Variable {
+    /// It is one of the drives' commands.
+    pub const fn is_of_the_drive(&self) -> bool {
+        use Variable::{DriveX, DriveXc, DriveXs, DriveY, DriveYc, DriveYs};
+        matches!(self, DriveX | DriveY | DriveXc | DriveXs | DriveYc | DriveYs)
+    }
 }
 
 /// One step of an expression: it takes its operands from a stack and puts its value there. Numbers are complex; `real`
@@ -139,6 +159,8 @@ pub struct Written {
     pub maps: &'static [(Target, &'static [Step])],
     /// an expression asks for the time of the recording
     pub in_time: bool,
+    /// an expression asks for the drives' commands
+    pub on_commands: bool,
     /// the text itself: two effects with one text are one
     pub text: &'static str,
 }
@@ -185,9 +207,7 @@ impl Written {
         if self.description.stage != Stage::Mechanics {
             return rate;
         }
-        let zero = T::zero();
-        let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: zero };
-        let scope = Scope { p, e: *e, at, rate: zero };
+        let scope = Scope { p, e: *e, at: never(), rate: T::zero() };
         for (target, steps) in self.maps {
             let value = scope.value(steps);
             match target {
@@ -208,9 +228,8 @@ impl Written {
         if self.description.stage != Stage::Actuation {
             return f;
         }
-        let zero = T::zero();
-        let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: zero };
-        let e = self.mapped(&Scope { p, e: Envelope::new(f.x_c, f.x_s, f.y_c, f.y_s), at, rate: zero });
+        let e = Envelope::new(f.x_c, f.x_s, f.y_c, f.y_s);
+        let e = self.mapped(&Scope { p, e, at: never(), rate: T::zero() });
         AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s }
     }
 
@@ -271,6 +290,13 @@ impl Written {
 const INVERSE_STEPS: usize = 40;
 /// Steps after the one that leaves nothing.
 const POLISH: usize = 3;
+
+/// For what does not depend on the moment.
+fn never<T: Real>() -> Moment<T> {
+    let zero = T::zero();
+    let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
+    Moment { t_s: zero, table_rad: zero, precession_rad_s: zero, drive }
+}
 
 fn energy<T: Real>(e: &Envelope<T>) -> T {
     e.x_c * e.x_c + e.x_s * e.x_s + e.y_c * e.y_c + e.y_s * e.y_s
@@ -402,7 +428,7 @@ impl<T: Real> Scope<'_, T> {
     }
 
     fn variable(&self, variable: Variable) -> Complex<T> {
-        let e = &self.e;
+        let (e, f) = (&self.e, &self.at.drive);
         Complex::real(match variable {
             Variable::X => return Complex { re: e.x_c, im: -e.x_s },
             Variable::Y => return Complex { re: e.y_c, im: -e.y_s },
@@ -419,6 +445,12 @@ impl<T: Real> Scope<'_, T> {
             Variable::Time => self.at.t_s,
             Variable::Table => self.at.table_rad,
             Variable::Precession => self.at.precession_rad_s,
+            Variable::DriveX => return Complex { re: f.x_c, im: -f.x_s },
+            Variable::DriveY => return Complex { re: f.y_c, im: -f.y_s },
+            Variable::DriveXc => f.x_c,
+            Variable::DriveXs => f.x_s,
+            Variable::DriveYc => f.y_c,
+            Variable::DriveYs => f.y_s,
         })
     }
 }

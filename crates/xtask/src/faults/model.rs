@@ -242,8 +242,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a phase comes after offsets",
         "model/src/effects/mod.rs",
-        "    DetectionPhase => detection_phase::DetectionPhase,\n    DetectionOffset => detection_offset::DetectionOffset,",
-        "    DetectionOffset => detection_offset::DetectionOffset,\n    DetectionPhase => detection_phase::DetectionPhase,",
+        "    DriveFeedthrough => drive_feedthrough::DriveFeedthrough,\n    DetectionOffset => detection_offset::DetectionOffset,",
+        "    DetectionOffset => detection_offset::DetectionOffset,\n    DriveFeedthrough => drive_feedthrough::DriveFeedthrough,",
         EFFECTS,
     ),
     fault(

@@ -146,7 +146,13 @@ fn run(id: EffectId) -> Option<Outputs> {
     let d = id.description();
     let zero = Symbol::ratio(0, 1);
     let p: [Symbol; MAX_PARAMETERS] = std::array::from_fn(|i| d.parameters.get(i).map_or(zero, |p| named(p.name)));
-    let at = Moment { t_s: named("t"), table_rad: named("table"), precession_rad_s: named("precession") };
+    let drive = AxisForces {
+        x_c: named("drive_x_c"),
+        x_s: named("drive_x_s"),
+        y_c: named("drive_y_c"),
+        y_s: named("drive_y_s"),
+    };
+    let at = Moment { t_s: named("t"), table_rad: named("table"), precession_rad_s: named("precession"), drive };
     let e = vibration();
     let own = [e.x_c, e.x_s, e.y_c, e.y_s];
     let four = |names: [&'static str; 4], own: [Option<Symbol>; 4], out: [Symbol; 4]| -> Outputs {

@@ -45,6 +45,14 @@ const ENVELOPE: [(&str, Variable); 11] = [
 ];
 const MOMENT: [(&str, Variable); 3] =
     [("t", Variable::Time), ("table", Variable::Table), ("precession", Variable::Precession)];
+const DRIVE: [(&str, Variable); 6] = [
+    ("drive_x", Variable::DriveX),
+    ("drive_y", Variable::DriveY),
+    ("drive_x_c", Variable::DriveXc),
+    ("drive_x_s", Variable::DriveXs),
+    ("drive_y_c", Variable::DriveYc),
+    ("drive_y_s", Variable::DriveYs),
+];
 const RATE: [(&str, Variable); 1] = [("rate", Variable::Rate)];
 
 /// What an effect of `stage` may ask for by name.
@@ -52,7 +60,7 @@ pub(crate) fn variables(stage: Stage) -> Vec<(&'static str, Variable)> {
     match stage {
         Stage::Input => [&RATE[..], &MOMENT[..]].concat(),
         Stage::Mechanics | Stage::Actuation => ENVELOPE.to_vec(),
-        Stage::Readout => [&ENVELOPE[..], &MOMENT[..]].concat(),
+        Stage::Readout => [&ENVELOPE[..], &MOMENT[..], &DRIVE[..]].concat(),
     }
 }
 
@@ -87,6 +95,7 @@ pub(crate) fn is_reserved(name: &str) -> bool {
     let named = |list: &[(&str, Variable)]| list.iter().any(|(n, _)| *n == name);
     named(&ENVELOPE)
         || named(&MOMENT)
+        || named(&DRIVE)
         || named(&RATE)
         || CONSTANTS.iter().any(|(n, _)| *n == name)
         || FUNCTIONS.iter().any(|(n, ..)| *n == name)
@@ -299,7 +308,7 @@ impl Parser<'_> {
         }
         if let Some((_, variable)) = self.variables.iter().find(|(n, _)| *n == name) {
             self.steps.push(Step::Variable(*variable));
-            return Ok(matches!(variable, Variable::X | Variable::Y));
+            return Ok(matches!(variable, Variable::X | Variable::Y | Variable::DriveX | Variable::DriveY));
         }
         let parameter = self.parameters.iter().position(|p| *p == name).and_then(|p| u8::try_from(p).ok());
         let Some(parameter) = parameter else {

@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use cvg_model::Envelope;
 use cvg_model::effects::written::{Step, Target, Variable, Written};
 use cvg_model::effects::{
     Description, EffectId, MAX_PARAMETERS, Moment, Parameter, Role, Scaling, Shown, Stage, Values,
 };
+use cvg_model::{AxisForces, Envelope};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
@@ -208,14 +208,15 @@ impl EffectText {
     /// Why an effect cannot take part in a fit.
     fn unfit(&self, effect: EffectId) -> Option<String> {
         let neutral: Values<f64> = effect.neutral();
-        let at = Moment { t_s: 1.3, table_rad: 0.7, precession_rad_s: -2.0 };
+        let drive = AxisForces { x_c: 0.3, x_s: -0.2, y_c: 0.1, y_s: 0.4 };
+        let at = Moment { t_s: 1.3, table_rad: 0.7, precession_rad_s: -2.0, drive };
         for e in probes() {
             let size = e.pendulum().e.sqrt();
             let left = match effect.description().stage {
                 Stage::Input => (effect.input_rate(&neutral, 1.0, &at) - 1.0).abs(),
                 Stage::Mechanics => difference(&effect.mechanics(&neutral, &e), &Envelope::zero()) / size,
                 Stage::Actuation => {
-                    let f = cvg_model::AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s };
+                    let f = AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s };
                     let out = effect.actuate(&neutral, f);
                     difference(&Envelope::new(out.x_c, out.x_s, out.y_c, out.y_s), &e) / size
                 }
@@ -378,13 +379,19 @@ fn admitted(text: &EffectText, compiled: Compiled, source: &str) -> &'static Wri
     if let Some(written) = known.iter().find(|w| w.text == whole) {
         return written;
     }
-    let in_time = compiled.maps.iter().any(|(_, steps)| steps.contains(&Step::Variable(Variable::Time)));
+    let asks_for = |wanted: fn(&Variable) -> bool| {
+        let mut steps = compiled.maps.iter().flat_map(|(_, steps)| steps);
+        steps.any(|step| matches!(step, Step::Variable(variable) if wanted(variable)))
+    };
+    let in_time = asks_for(|v| *v == Variable::Time);
+    let on_commands = asks_for(Variable::is_of_the_drive);
     let maps: Vec<(Target, &'static [Step])> =
         compiled.maps.into_iter().map(|(target, steps)| (target, &*steps.leak())).collect();
     let written = &*Box::leak(Box::new(Written {
         description: description(text, compiled.stage, source),
         maps: maps.leak(),
         in_time,
+        on_commands,
         text: whole.leak(),
     }));
     known.push(written);
