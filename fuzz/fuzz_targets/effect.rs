@@ -19,7 +19,7 @@ fuzz_target!(|bytes: &[u8]| {
     for (i, a) in NUMBERS.into_iter().enumerate() {
         let b = NUMBERS[(i + 1) % NUMBERS.len()];
         let (p, e) = ([b, a, 1.0, 0.0], Envelope::new(a, b, 0.5, -a));
-        let at = Moment { t_s: a, table_rad: b, precession_rad_s: a, drive: AxisForces { x_c: b, x_s: a, y_c: a, y_s: b } };
+        let at = Moment { t_s: a, table_rad: b, precession_rad_s: a, warmer_k: b, drive: AxisForces { x_c: b, x_s: a, y_c: a, y_s: b } };
         let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b });
         std::hint::black_box((effect.read(&p, e, &at), effect.unread(&p, e, &at), effect.mechanics(&p, &e), forces));
         std::hint::black_box(effect.input_rate(&p, a, &at));

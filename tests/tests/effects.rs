@@ -11,7 +11,7 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 19] = [
+const IDS: [&str; 20] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
@@ -19,6 +19,7 @@ const IDS: [&str; 19] = [
     "detection-cubic",
     "detection-saturation",
     "drive-feedthrough",
+    "temperature",
     "actuation-gain-mismatch",
     "actuation-skew",
     "anisodamping",
@@ -132,12 +133,12 @@ for_each_scalar! {
     #[test]
     fn prop_a_neutral_effect_changes_nothing(
         e in envelopes(), f in envelopes(), rate in -10.0..10.0_f64, t_s in 0.0..1e3_f64, turn in angles(),
-        precession in -10.0..10.0_f64,
+        precession in -10.0..10.0_f64, warmer in -50.0..50.0_f64,
     ) {
         let ((e, e64), (f, _)) = (rounded_envelope::<T>(&e), rounded_envelope::<T>(&f));
         let f = AxisForces { x_c: f.x_c, x_s: f.x_s, y_c: f.y_c, y_s: f.y_s };
         let precession_rad_s = rounded(precession).0;
-        let at = Moment { t_s: rounded(t_s).0, table_rad: rounded(turn).0, precession_rad_s, drive: f };
+        let at = Moment { t_s: rounded(t_s).0, table_rad: rounded(turn).0, precession_rad_s, warmer_k: rounded(warmer).0, drive: f };
         let rate = rounded::<T>(rate).0;
         for effect in EffectId::ALL {
             let neutral = effect.neutral::<T>();

@@ -218,6 +218,7 @@ fn evaluated(effect: EffectId) {
                 t_s: a,
                 table_rad: b,
                 precession_rad_s: a,
+                warmer_k: b,
                 drive: AxisForces { x_c: b, x_s: a, y_c: 0.5, y_s: b },
             },
         );

@@ -18,6 +18,7 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
         "detection-phase" => [0.4 * u, 0.0, 0.0, 0.0],
         "drive-feedthrough" => unit.map(|u| 0.1 * u),
         "detection-gain-mismatch" => [1.0 + 0.4 * u, 0.0, 0.0, 0.0],
+        "temperature" => [1e-3 * u, 0.0, 0.0, 0.0],
         "gain-drift" => [1e-3 * u, 0.0, 0.0, 0.0],
         "detection-offset" => [0.5 * u, 0.5 * v, 0.0, 0.0],
         // from no clipping to a carrier three times over the clip level
@@ -42,9 +43,10 @@ prop_compose! {
 
 prop_compose! {
     fn moment()(t_s in 0.0_f64..100.0, table_rad in -50.0_f64..50.0, precession_rad_s in -10.0_f64..10.0,
+        warmer_k in -40.0_f64..40.0,
         [x_c, x_s, y_c, y_s] in prop::array::uniform4(-1.0_f64..1.0))
         -> Moment<f64> {
-        Moment { t_s, table_rad, precession_rad_s, drive: AxisForces { x_c, x_s, y_c, y_s } }
+        Moment { t_s, table_rad, precession_rad_s, warmer_k, drive: AxisForces { x_c, x_s, y_c, y_s } }
     }
 }
 

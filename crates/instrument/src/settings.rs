@@ -276,8 +276,9 @@ fn most_unseen(fastest_rad: f64) -> u32 {
 //# An effect that is told by the time of a recording MUST be refused where the electronics compensate.
 /// What is told by the clock of a recording says nothing of another day.
 fn refuse_another_days_clock(readout: &[(EffectId, [f64; MAX_PARAMETERS])]) -> Result<(), ConfigError> {
-    if readout.iter().any(|(id, _)| id.in_time()) {
-        return Err(ConfigError { parameter: "readout", expected: "free of what is told by a recording's clock" });
+    if readout.iter().any(|(id, _)| id.in_time() || id.by_temperature()) {
+        let expected = "free of what is told by a recording's clock or its thermometer";
+        return Err(ConfigError { parameter: "readout", expected });
     }
     Ok(())
 }

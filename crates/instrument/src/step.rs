@@ -378,10 +378,11 @@ impl<T: Float> Instrument<T> {
     #[inline]
     fn moment(&self, state: &State<T>) -> Moment<T> {
         Moment {
-            // effects that are told by it are refused
+            // effects that are told by it, or by the temperature, are refused
             t_s: T::zero(),
             table_rad: T::zero(),
             precession_rad_s: self.precession.rate_rad_s(&state.precession),
+            warmer_k: T::zero(),
             drive: self.undelayed(&state.drive, state.seen.correction_rad_s),
         }
     }

@@ -11,7 +11,7 @@ const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 
 
 fn now() -> Moment<f64> {
     let drive = AxisForces { x_c: 0.3, x_s: -0.2, y_c: 0.1, y_s: 0.4 };
-    Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4, drive }
+    Moment { t_s: 2.5, table_rad: 0.7, precession_rad_s: -0.4, warmer_k: 5.0, drive }
 }
 
 #[track_caller]

@@ -62,6 +62,7 @@ fn moments() -> [Moment<f64>; 3] {
         t_s,
         table_rad,
         precession_rad_s,
+        warmer_k: t_s,
         drive: AxisForces { x_c: 0.25, x_s: -0.5, y_c: 0.125, y_s: 0.75 },
     })
 }

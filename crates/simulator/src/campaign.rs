@@ -141,6 +141,7 @@ impl Simulated {
             carrier_hz: s.carrier_hz,
             angular_gain: s.angular_gain_stated,
             period_deg: (s.instrument == Instrument::Sensor).then_some(360.0),
+            temperature_c: s.temperature.map(|t| t.reference_c),
         };
         let runs = s.runs.iter().map(CampaignRun::of).collect();
         serialised(&CampaignFile { campaign, run: runs })
@@ -195,6 +196,8 @@ struct Campaign<'a> {
     angular_gain: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     period_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature_c: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -260,7 +263,7 @@ fn record(scenario: &Scenario, index: usize, run: &Run) -> Vec<Column> {
             }
         }
     }
-    rows.columns(scenario.settings(), run)
+    rows.columns(scenario.settings(), index, run)
 }
 
 /// A recording while it grows.
@@ -275,14 +278,14 @@ struct Rows {
 }
 
 impl Rows {
-    fn columns(self, s: &Settings, run: &Run) -> Vec<Column> {
+    fn columns(self, s: &Settings, index: usize, run: &Run) -> Vec<Column> {
         let reference = match run {
             Run::Rotation { reference, .. } => *reference,
             Run::Ringdown { .. } => Reference::Rate,
         };
         let sensor = s.instrument == Instrument::Sensor;
         let temperature =
-            s.temperature.map(|t| self.t_s.iter().map(|time| t.start_c + t.drift_k_per_s * time).collect());
+            s.temperature.map(|t| self.t_s.iter().map(|time| t.start_of(index) + t.drift_k_per_s * time).collect());
         let commanded = self.rate_dps.iter().map(|rate| (rate * 1e9).round() / 1e9).collect();
         let [x_c, x_s, y_c, y_s, v_as, v_qc] = self.channels;
         let candidates = [

@@ -68,6 +68,8 @@ pub struct Course {
     pub energy_off_s: Option<f64>,
     /// the loops run this many control samples before t = 0
     pub warm_up_samples: u64,
+    /// temperature at t = 0 over the one that parameters refer to, K, and its drift, K/s
+    pub warmer: [f64; 2],
 }
 
 /// What the electronics know at one control sample.
@@ -107,6 +109,7 @@ pub struct ClosedLoop {
     energy_set_v2: f64,
     energy_off_at: u64,
     warm_up_samples: u64,
+    warmer: [f64; 2],
     rate_is_nominal: bool,
     reads_plainly: bool,
     noise: Option<Noise>,
@@ -186,6 +189,7 @@ impl ClosedLoop {
                 .energy_off_s
                 .map_or(u64::MAX, |off| samples(off, design.period_s).saturating_add(course.warm_up_samples)),
             warm_up_samples: course.warm_up_samples,
+            warmer: course.warmer,
             rate_is_nominal: design.stages.rate_is_nominal(),
             reads_plainly: design.stages.readout.is_empty()
                 && design.readout_compensation.is_none()
@@ -376,6 +380,7 @@ impl ClosedLoop {
             t_s,
             table_rad: self.table_rad,
             precession_rad_s: -self.design.resonator.angular_gain * self.leg.rate_rad_s,
+            warmer_k: self.warmer[0] + self.warmer[1] * t_s,
             drive: self.drive,
         }
     }

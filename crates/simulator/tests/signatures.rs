@@ -228,6 +228,16 @@ fn gain_drift_is_a_sine_of_2_theta_that_grows_in_time() {
 }
 
 #[test]
+fn temperature_is_a_sine_of_2_theta_in_proportion_to_it() {
+    let effect = r#"{ id = "temperature", gain_per_k = 1e-4 }"#;
+    for start_c in [45.0, 5.0] {
+        let keys = format!("temperature = {{ start_c = {start_c:?} }}");
+        let second = angle_harmonics(&rotation_with(&keys, effect, 500.0, 10.0), &[2.0])[0];
+        close(second.sin, 0.5e-4 * (start_c - 25.0));
+    }
+}
+
+#[test]
 fn time_periodic_is_a_line_in_time_at_any_rate() {
     for rate in [500.0, 200.0] {
         let run = rotation(r#"{ id = "time-periodic", frequency = 7.3, amplitude = 1e-3, phase = 50.0 }"#, rate, 10.0);

@@ -29,6 +29,9 @@ pub(crate) struct Track {
     pub(crate) stride: usize,
     source: Source,
     commands: Option<[Vec<f64>; 2]>,
+    /// temperature, °C, and over the one that parameters refer to, K
+    temp_c: Option<Vec<f64>>,
+    warmer_k: Vec<f64>,
     /// how fast the pattern turned as it was read, rad/s, where there are commands
     turn_rad_s: Vec<f64>,
 }
@@ -111,9 +114,12 @@ impl Track {
             _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
         };
         let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [held(a), held(q)]);
+        let temp_c = recording.temp_c.take().filter(|t| t.iter().any(|v| v.is_finite())).map(held);
         let segments = vec![Segment { range: 0..recording.t_s.len(), role }];
         let (t_s, turn_rad_s) = (recording.t_s, Vec::new());
-        let mut track = Self { name, t_s, input_rad, segments, stride: 1, source, commands, turn_rad_s };
+        let warmer_k = Vec::new();
+        let mut track =
+            Self { name, t_s, input_rad, segments, stride: 1, source, commands, temp_c, warmer_k, turn_rad_s };
         if track.has_commands() {
             track.turn_rad_s = (0..track.t_s.len()).into_par_iter().map(|i| track.turn(i)).collect();
         }
@@ -153,7 +159,13 @@ impl Track {
     /// of commands.
     #[inline]
     pub(crate) fn instant(&self, i: usize, precession_rad_s: f64) -> Moment<f64> {
-        Moment { t_s: self.t_s[i], table_rad: self.input_rad[i], precession_rad_s, ..Moment::default() }
+        Moment {
+            t_s: self.t_s[i],
+            table_rad: self.input_rad[i],
+            precession_rad_s,
+            warmer_k: self.warmer_k(i),
+            ..Moment::default()
+        }
     }
 
     /// The same with what the electronics commanded the drives to, where that was recorded.
@@ -161,6 +173,23 @@ impl Track {
         let at = self.instant(i, precession_rad_s);
         let Some([v_as, v_qc]) = &self.commands else { return at };
         Moment { drive: commanded(&self.envelope(i), &ControlOutputs { v_as: v_as[i], v_qc: v_qc[i] }), ..at }
+    }
+
+    /// Temperature of sample `i` over the one that parameters refer to, K; 0 where it was not recorded.
+    #[inline]
+    pub(crate) fn warmer_k(&self, i: usize) -> f64 {
+        self.warmer_k.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// The recorded temperature, °C, of what is used of the run.
+    pub(crate) fn temperatures_c(&self) -> impl Iterator<Item = f64> {
+        let used = self.segments.iter().flat_map(|s| s.range.clone());
+        self.temp_c.iter().flat_map(move |t| used.clone().map(|i| t[i]))
+    }
+
+    /// Sets the temperature that parameters refer to, °C.
+    pub(crate) fn refer_to(&mut self, reference_c: f64) {
+        self.warmer_k = self.temp_c.iter().flatten().map(|t| t - reference_c).collect();
     }
 
     /// How fast the pattern turned around sample `i`, as it was read, rad/s: less than a quarter turn between samples.

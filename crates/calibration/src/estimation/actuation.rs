@@ -59,13 +59,19 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     };
     let quadrature = r.xs_v.as_ref().zip(r.ys_v.as_ref());
     let angle_rad = angle_deg.to_radians();
+    let warmer_k = |i: usize| {
+        let difference = r.temp_c.as_ref().zip(hypothesis.reference_c).map(|(t, reference)| t[i] - reference);
+        difference.filter(|d| d.is_finite()).unwrap_or_default()
+    };
     let sample = |i: usize| {
         let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
         let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
         // commands that are missing in a row move nothing there
         let command = |v: Option<&Vec<f64>>| v.map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
         let commands = ControlOutputs { v_as: command(Some(v_as)), v_qc: command(r.vqc_v.as_ref()) };
-        hypothesis.unread(seen, &Moment { t_s: r.t_s[i], drive: commanded(&seen, &commands), ..Moment::default() })
+        let warmer_k = warmer_k(i);
+        hypothesis
+            .unread(seen, &Moment { t_s: r.t_s[i], warmer_k, drive: commanded(&seen, &commands), ..Moment::default() })
     };
     let mut off_angle = Vec::new();
     let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new()));

@@ -8,7 +8,6 @@ use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
-use crate::estimation::identifiability::Alike;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
@@ -37,15 +36,6 @@ pub mod belief {
 
 /// Residuals further out than this many robust deviations are spikes.
 const SPIKE: f64 = 6.0;
-/// Rates that differ by less than this share count as one.
-pub(crate) const SAME_RATE: f64 = 0.05;
-/// Amplitudes that differ by less than this share count as one.
-const SAME_AMPLITUDE: f64 = 0.05;
-/// A rate that changes by more than this share within a run varies.
-const VARYING_RATE: f64 = 0.2;
-/// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
-const STRETCHES: usize = 50;
-const EDGE: usize = 30;
 /// What the energy balance leaves of ln a, and how far it is trusted at best; less where the angle has no say in the
 /// force scale. A recorded v_as is taken to act, noise and all: noise that a logger added pulls the scale towards zero.
 const BALANCE_NOISE: f64 = 1e-3;
@@ -142,6 +132,10 @@ impl Dataset {
             start.damping_per_s = belief::DAMPING_PER_S;
         }
         let command_rms = command_rms(&prepared);
+        start.reference_c = campaign.temperature_c.or_else(|| mean_temperature(&prepared));
+        if let Some(reference_c) = start.reference_c {
+            prepared.iter_mut().for_each(|p| p.track.refer_to(reference_c));
+        }
         Ok(Self {
             instrument,
             command_rms,
@@ -183,65 +177,6 @@ impl Dataset {
         all
     }
 
-    /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.
-    fn stretches(&self) -> Vec<Vec<f64>> {
-        let tracks = self.tracks.iter().map(|p| &p.track);
-        let mut rates: Vec<Vec<f64>> = tracks
-            .flat_map(|t| t.segments.iter().filter(|s| s.role == Role::Fit).map(move |s| (t, &s.range)))
-            .map(|(t, range)| {
-                let step = (range.len() / STRETCHES).max(1);
-                let ends = range.clone().step_by(step).zip(range.clone().skip(step).step_by(step));
-                ends.map(|(i, j)| (t.input_rad[j] - t.input_rad[i]) / (t.t_s[j] - t.t_s[i])).collect()
-            })
-            .collect();
-        let fastest = rates.iter().flatten().fold(0.0, |m: f64, r| m.max(r.abs()));
-        for r in &mut rates {
-            r.retain(|r| r.abs() > SAME_RATE * fastest);
-        }
-        rates
-    }
-
-    /// The rate changes within a fitted run, as in a turn there and back.
-    pub(crate) fn rate_varies(&self) -> bool {
-        self.stretches().into_iter().any(|mut rates| {
-            rates.sort_by(f64::total_cmp);
-            let tenth = rates.len() / 10;
-            !rates.is_empty() && {
-                let (low, high) = (rates[tenth], rates[rates.len() - 1 - tenth]);
-                high - low > VARYING_RATE * low.abs().max(high.abs())
-            }
-        })
-    }
-
-    /// The table turns both ways in what is fitted.
-    pub(crate) fn both_directions(&self) -> bool {
-        let rates = self.stretches();
-        let any = |sign: f64| rates.iter().flatten().any(|r| r * sign > 0.0);
-        any(1.0) && any(-1.0)
-    }
-
-    /// The table turns at two or more speeds in what is fitted.
-    pub(crate) fn speeds_differ(&self) -> bool {
-        let mut speeds: Vec<f64> = self.stretches().into_iter().flatten().map(f64::abs).collect();
-        speeds.sort_by(f64::total_cmp);
-        let edge = speeds.len() / EDGE;
-        !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
-    }
-
-    /// What the fitted runs have in common.
-    pub(crate) fn alike(&self) -> Alike {
-        let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
-        let ends = fitted
-            .map(|p| p.track.mean_amplitude())
-            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), a| (low.min(a), high.max(a)));
-        Alike {
-            direction: !self.both_directions(),
-            speed: !self.speeds_differ(),
-            amplitude: ends.1 < (1.0 + SAME_AMPLITUDE) * ends.0,
-            no_ring_downs: self.ring_down_runs.is_empty(),
-        }
-    }
-
     /// The runs were left by another fit than this.
     pub(crate) fn disturbed(&self, fit: &Fit) -> bool {
         self.tracks.iter().zip(&fit.starts).any(|(p, s)| p.starts != *s)
@@ -251,16 +186,6 @@ impl Dataset {
     pub(crate) fn excess(&self) -> f64 {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
         median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
-    }
-
-    /// Fitted runs were made at two or more rates, or in both directions.
-    pub(crate) fn tracks_differ(&self) -> bool {
-        self.both_directions() || self.speeds_differ()
-    }
-
-    /// Runs that differ tell what the drive does, where the quadrature tells the split of the frequencies from it.
-    pub(crate) fn tells_the_drive(&self) -> bool {
-        self.tracks_differ() && self.tracks.iter().any(|p| p.track.has_quadrature())
     }
 
     /// Priors for the unknowns that the data may be silent about.
@@ -442,6 +367,13 @@ impl Dataset {
                 Noise { angle: SPIKE * angle.max(LEAST_NOISE), amplitude: SPIKE * left.amplitude.max(LEAST_NOISE) };
         }
     }
+}
+
+/// Mean temperature of what is fitted, °C, where one was recorded.
+fn mean_temperature(tracks: &[Prepared]) -> Option<f64> {
+    let all = || tracks.iter().flat_map(|p| p.track.temperatures_c());
+    let count = all().count();
+    (count > 0).then(|| all().sum::<f64>() / count as f64)
 }
 
 /// rms of the energy and the quadrature command per unit of amplitude over all tracks, V/V.

@@ -193,6 +193,7 @@ fn excess_angle(
                 t_s: t0 + s * (t1 - t0),
                 table_rad: a0 + s * (a1 - a0) + excess + 0.5 * h * (t1 - t0) * sum.value,
                 precession_rad_s: predictor.hypothesis.precession(rate),
+                warmer_k: (1.0 - s) * track.warmer_k(from) + s * track.warmer_k(to),
                 ..Moment::default()
             };
             sum = sum + predictor.excess_rate(rate, &at);

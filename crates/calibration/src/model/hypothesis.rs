@@ -60,6 +60,8 @@ pub struct Hypothesis {
     pub angle_table: Option<AngleTable>,
     /// channels cut off by their converters, after all readout effects
     pub clip: Option<ChannelClip>,
+    /// the temperature that parameters refer to, °C, where one was recorded
+    pub reference_c: Option<f64>,
     /// a rate gyroscope's bias, rad/s
     pub rate_bias_rad_s: f64,
 }
@@ -116,6 +118,7 @@ impl Hypothesis {
             members: Vec::new(),
             angle_table: None,
             clip: None,
+            reference_c: None,
             rate_bias_rad_s: 0.0,
         }
     }

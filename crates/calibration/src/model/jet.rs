@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn slopes_of_every_readout_effect_are_those_of_finite_differences() {
         let drive = AxisForces { x_c: 0.2, x_s: 0.1, y_c: -0.3, y_s: 0.05 };
-        let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, drive };
+        let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, warmer_k: 4.0, drive };
         let z = Envelope::new(0.7, 0.01, -0.6, -0.02);
         for &id in EffectId::ALL.iter().filter(|e| e.description().stage == Stage::Readout) {
             let parameters = id.description().parameters;

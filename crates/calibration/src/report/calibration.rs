@@ -70,6 +70,8 @@ struct File {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     amplitude_v: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    temperature_c: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     tool: Option<Tool>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     input: Vec<Input>,
@@ -132,6 +134,7 @@ impl Calibration {
                 .collect(),
             rate_bias_rad_s: h.rate_bias_rad_s,
             amplitude_v: self.provenance.amplitude_v,
+            temperature_c: h.reference_c,
             tool: self.provenance.tool.clone(),
             input: self.provenance.inputs.clone(),
             angle_table: h.angle_table.clone(),
@@ -193,6 +196,7 @@ impl Calibration {
         }
         hypothesis.angle_table = file.angle_table;
         hypothesis.clip = file.clip;
+        hypothesis.reference_c = file.temperature_c;
         hypothesis.rate_bias_rad_s = file.rate_bias_rad_s;
         let provenance = Provenance { tool: file.tool, inputs: file.input, amplitude_v: file.amplitude_v };
         Ok(Self { device: file.device, hypothesis, provenance })

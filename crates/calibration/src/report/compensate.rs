@@ -40,6 +40,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let h = &portable(&calibration.hypothesis);
     same_unit(calibration, recording)?;
     needs_no_reference(h, recording)?;
+    needs_no_temperature(h, recording)?;
     let run = Run {
         kind: RunKind::Rotation,
         file: recording.source.clone(),
@@ -48,7 +49,10 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         amplitude: None,
         recording: recording.clone(),
     };
-    let track = Track::whole(run, h.period_rad)?;
+    let mut track = Track::whole(run, h.period_rad)?;
+    if let Some(reference_c) = h.reference_c {
+        track.refer_to(reference_c);
+    }
     let mut out = recording.clone();
     let mut angle_rad: Vec<f64> = Vec::new();
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
@@ -134,6 +138,17 @@ fn same_unit(calibration: &Calibration, recording: &Recording) -> Result<(), Ref
         &recording.source.display().to_string(),
         format!("its amplitude is {here:.4e}, the calibration was made at {usual:.4e}{looks}"),
         "a recording of the calibrated instrument in the unit of its calibration",
+    ))
+}
+
+/// A recording without a temperature can be compensated where nothing follows it.
+fn needs_no_temperature(h: &Hypothesis, recording: &Recording) -> Result<(), Refusal> {
+    let follows = h.members.iter().find(|m| m.id.by_temperature());
+    let Some(member) = follows.filter(|_| recording.temp_c.is_none()) else { return Ok(()) };
+    Err(Refusal::new(
+        &recording.source.display().to_string(),
+        format!("{} follows the temperature, and there is no column temp_c", member.id),
+        "a recording with its temperature",
     ))
 }
 

@@ -42,7 +42,8 @@ pub(crate) fn candidates(
     for &id in EffectId::ALL.iter().chain(&dataset.written) {
         let d = id.description();
         let unseen = (d.stage == Stage::Actuation || id.seen_by_loops()) && !loops;
-        if d.declared || unseen || (sensor && !d.in_sensors) {
+        let unmeasured = id.by_temperature() && !dataset.temperature_varies();
+        if d.declared || unseen || unmeasured || (sensor && !d.in_sensors) {
             continue;
         }
         if d.scaling.rate > 0 && !dataset.rate_varies() {

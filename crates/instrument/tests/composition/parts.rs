@@ -143,7 +143,7 @@ impl<T: Float> Parts<T> {
         let zero = T::zero();
         // none of the effects here is made of commands
         let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
-        let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: rate, drive };
+        let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: rate, warmer_k: zero, drive };
         s.fingerprint = now;
         s.seen.readout = measured.envelope;
         s.seen.compensated = match &self.readout {

@@ -6,7 +6,7 @@ use cvg_model::effects::{EffectId, Stage, Values};
 use super::Bench;
 
 #[test]
-fn an_effect_of_a_recordings_clock_is_refused_and_every_other_of_the_readout_is_not() {
+fn an_effect_of_a_recordings_clock_or_thermometer_is_refused_and_every_other_of_the_readout_is_not() {
     let mut refused = Vec::new();
     for &id in EffectId::ALL.iter().filter(|id| id.description().stage == Stage::Readout) {
         let mut values: Values<f64> = id.neutral();
@@ -16,7 +16,7 @@ fn an_effect_of_a_recordings_clock_is_refused_and_every_other_of_the_readout_is_
         // also behind one that is taken
         let effects = [(EffectId::DetectionSkew, [0.01, 0.0, 0.0, 0.0]), (id, values)];
         match Instrument::<f32>::new(&Settings { readout: &effects, ..Settings::default() }) {
-            Ok(_) => assert!(!id.in_time(), "{id:?}"),
+            Ok(_) => assert!(!id.in_time() && !id.by_temperature(), "{id:?}"),
             Err(e) => {
                 assert_eq!(e.parameter, "readout", "{id:?}: {e}");
                 refused.push(id);
@@ -24,7 +24,7 @@ fn an_effect_of_a_recordings_clock_is_refused_and_every_other_of_the_readout_is_
         }
     }
     refused.sort_by_key(|id| id.description().id);
-    assert_eq!(refused, [EffectId::GainDrift, EffectId::TimePeriodic]);
+    assert_eq!(refused, [EffectId::GainDrift, EffectId::Temperature, EffectId::TimePeriodic]);
 }
 
 /// A readout that saturates at 0.9 V: none of 1 V has a vibration behind it.

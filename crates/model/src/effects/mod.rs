@@ -29,6 +29,7 @@ pub mod rate_offset;
 pub mod scale_drift;
 pub mod spring_cubic;
 pub mod table_harmonic;
+pub mod temperature;
 pub mod time_periodic;
 #[cfg(feature = "written")]
 pub mod written;
@@ -63,6 +64,8 @@ pub struct Moment<T> {
     pub table_rad: T,
     /// nominal precession rate −kΩ, rad/s
     pub precession_rad_s: T,
+    /// temperature over the one that parameters refer to, K
+    pub warmer_k: T,
     /// what the electronics command the drives of X and Y to, V: what acts while the readout is taken
     pub drive: AxisForces<T>,
 }
@@ -76,6 +79,7 @@ impl<T: Copy> Moment<T> {
             t_s: f(self.t_s),
             table_rad: f(self.table_rad),
             precession_rad_s: f(self.precession_rad_s),
+            warmer_k: f(self.warmer_k),
             drive: AxisForces { x_c: f(d.x_c), x_s: f(d.x_s), y_c: f(d.y_c), y_s: f(d.y_s) },
         }
     }
@@ -230,6 +234,9 @@ pub trait Effect {
     /// It is seen in what the loops answer to it: nothing tells it without the quadrature and the commands.
     const SEEN_BY_LOOPS: bool = false;
 
+    /// It is told by the temperature: [`Moment::warmer_k`].
+    const BY_TEMPERATURE: bool = false;
+
     /// It is made of the drives' commands: [`Moment::drive`].
     const ON_COMMANDS: bool = false;
 
@@ -344,6 +351,15 @@ macro_rules! library {
                     $(Self::$name => const { <$effect as Effect>::SEEN_BY_LOOPS },)+
                     #[cfg(feature = "written")]
                     Self::WrittenFirst(_) | Self::Written(_) => false,
+                }
+            }
+
+            /// [`Effect::BY_TEMPERATURE`]
+            pub const fn by_temperature(self) -> bool {
+                match self {
+                    $(Self::$name => const { <$effect as Effect>::BY_TEMPERATURE },)+
+                    #[cfg(feature = "written")]
+                    Self::WrittenFirst(text) | Self::Written(text) => text.by_temperature,
                 }
             }
 
@@ -473,6 +489,7 @@ library! {
     DetectionSkew => detection_skew::DetectionSkew,
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,
+    Temperature => temperature::Temperature,
     DetectionPhase => detection_phase::DetectionPhase,
     DriveFeedthrough => drive_feedthrough::DriveFeedthrough,
     DetectionOffset => detection_offset::DetectionOffset,

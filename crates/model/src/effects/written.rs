@@ -51,6 +51,8 @@ pub enum Variable {
     Table,
     /// nominal precession rate −kΩ, rad/s
     Precession,
+    /// temperature over the one that parameters refer to, K
+    Warmer,
     /// F_x = f_xc − i f_xs, what the drive of X is commanded to, V
     DriveX,
     /// F_y
@@ -159,6 +161,8 @@ pub struct Written {
     pub maps: &'static [(Target, &'static [Step])],
     /// an expression asks for the time of the recording
     pub in_time: bool,
+    /// an expression asks for the temperature
+    pub by_temperature: bool,
     /// an expression asks for the drives' commands
     pub on_commands: bool,
     /// the text itself: two effects with one text are one
@@ -295,7 +299,7 @@ const POLISH: usize = 3;
 fn never<T: Real>() -> Moment<T> {
     let zero = T::zero();
     let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
-    Moment { t_s: zero, table_rad: zero, precession_rad_s: zero, drive }
+    Moment { t_s: zero, table_rad: zero, precession_rad_s: zero, warmer_k: zero, drive }
 }
 
 fn energy<T: Real>(e: &Envelope<T>) -> T {
@@ -445,6 +449,7 @@ impl<T: Real> Scope<'_, T> {
             Variable::Time => self.at.t_s,
             Variable::Table => self.at.table_rad,
             Variable::Precession => self.at.precession_rad_s,
+            Variable::Warmer => self.at.warmer_k,
             Variable::DriveX => return Complex { re: f.x_c, im: -f.x_s },
             Variable::DriveY => return Complex { re: f.y_c, im: -f.y_s },
             Variable::DriveXc => f.x_c,

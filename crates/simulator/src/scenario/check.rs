@@ -59,6 +59,8 @@ pub(super) fn settings(s: &Settings) -> Result<(), ScenarioError> {
     if let Some(t) = &s.temperature {
         finite("temperature.start_c", t.start_c)?;
         finite("temperature.drift_k_per_s", t.drift_k_per_s)?;
+        finite("temperature.step_k", t.step_k)?;
+        finite("temperature.reference_c", t.reference_c)?;
     }
     let per_row = s.control_hz / s.sample_hz;
     if (per_row - per_row.round()).abs() > 1e-9 * per_row || per_row < 0.5 {
@@ -89,6 +91,9 @@ fn effects(s: &Settings) -> Result<(), ScenarioError> {
         let description = setting.id.description();
         if s.instrument == Instrument::Sensor && !description.in_sensors {
             return Err(ScenarioError::invalid(field, format!("a sensor cannot have {}", setting.id)));
+        }
+        if setting.id.by_temperature() && s.temperature.is_none() {
+            return Err(ScenarioError::invalid(field, format!("{} needs a [temperature]", setting.id)));
         }
         if field == "compensation" && !matches!(description.stage, Stage::Readout | Stage::Actuation) {
             return Err(ScenarioError::invalid(

@@ -103,7 +103,7 @@ impl Scenario {
             return None;
         }
         let [mut start, noise, force_noise] = self.noises(index);
-        let course = self.course(run, start.angle_rad());
+        let course = self.course(index, run, start.angle_rad());
         let mut closed = ClosedLoop::new(&self.design, &course, noise, force_noise, self.wander(index));
         closed.warm_up();
         Some(closed)
@@ -116,7 +116,7 @@ impl Scenario {
             return None;
         }
         let [mut start, noise, _] = self.noises(index);
-        let course = self.course(run, start.angle_rad());
+        let course = self.course(index, run, start.angle_rad());
         let sensor = Sensor {
             stages: self.design.stages.clone(),
             angular_gain: self.settings.angular_gain,
@@ -158,9 +158,11 @@ impl Scenario {
         Wander { gains: gain(0).zip(gain(1)).map(|(x, y)| [x, y]), table: flicker(self.settings.table_wander, 2) }
     }
 
-    fn course(&self, run: &Run, random_rad: f64) -> Course {
+    fn course(&self, index: usize, run: &Run, random_rad: f64) -> Course {
         let amplitude_v = self.settings.amplitude_v * run.amplitude();
         let warm_up_samples = samples(self.settings.warm_up_s, self.design.period_s);
+        let warmer = self.settings.temperature.map(|t| [t.start_of(index) - t.reference_c, t.drift_k_per_s]);
+        let warmer = warmer.unwrap_or_default();
         match run {
             Run::Rotation { rate_dps, profile, start_deg, .. } => {
                 let rate = rate_dps.to_radians();
@@ -169,7 +171,7 @@ impl Scenario {
                     Profile::ThereAndBack => vec![(0, rate), (self.control_samples(run) / 2, -rate)],
                 };
                 let start_rad = start_deg.map_or(random_rad, f64::to_radians);
-                Course { legs, amplitude_v, start_rad, hold_rad: None, energy_off_s: None, warm_up_samples }
+                Course { legs, amplitude_v, start_rad, hold_rad: None, energy_off_s: None, warm_up_samples, warmer }
             }
             Run::Ringdown { angle_deg, energy_off_s, .. } => Course {
                 legs: vec![(0, 0.0)],
@@ -178,6 +180,7 @@ impl Scenario {
                 hold_rad: Some(angle_deg.to_radians()),
                 energy_off_s: Some(*energy_off_s),
                 warm_up_samples,
+                warmer,
             },
         }
     }

@@ -102,6 +102,20 @@ pub struct Temperature {
     /// K/s
     #[serde(default)]
     pub drift_k_per_s: f64,
+    /// by how much each run starts warmer than the one before it, K
+    #[serde(default)]
+    pub step_k: f64,
+    /// that parameters refer to, °C
+    #[serde(default = "defaults::reference_c")]
+    pub reference_c: f64,
+}
+
+impl Temperature {
+    /// Temperature at t = 0 of the run at `index`, °C.
+    #[allow(clippy::cast_precision_loss, reason = "no scenario has 2^53 runs")]
+    pub fn start_of(&self, index: usize) -> f64 {
+        self.start_c + self.step_k * index as f64
+    }
 }
 
 /// Tuning of the loops.
@@ -245,6 +259,9 @@ impl Run {
 }
 
 mod defaults {
+    pub(super) fn reference_c() -> f64 {
+        25.0
+    }
     pub(super) fn tau_s() -> f64 {
         22.0
     }

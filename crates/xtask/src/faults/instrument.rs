@@ -155,8 +155,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what a recording's clock told is compensated",
         "instrument/src/settings.rs",
-        "readout.iter().any(|(id, _)| id.in_time())",
-        "readout.iter().take(1).any(|(id, _)| id.in_time())",
+        "readout.iter().any(|(id, _)| id.in_time() || id.by_temperature())",
+        "readout.iter().take(1).any(|(id, _)| id.in_time() || id.by_temperature())",
         OPEN_LOOP,
     ),
     fault(

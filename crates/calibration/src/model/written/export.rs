@@ -152,7 +152,13 @@ fn run(id: EffectId) -> Option<Outputs> {
         y_c: named("drive_y_c"),
         y_s: named("drive_y_s"),
     };
-    let at = Moment { t_s: named("t"), table_rad: named("table"), precession_rad_s: named("precession"), drive };
+    let at = Moment {
+        t_s: named("t"),
+        table_rad: named("table"),
+        precession_rad_s: named("precession"),
+        warmer_k: named("warmer"),
+        drive,
+    };
     let e = vibration();
     let own = [e.x_c, e.x_s, e.y_c, e.y_s];
     let four = |names: [&'static str; 4], own: [Option<Symbol>; 4], out: [Symbol; 4]| -> Outputs {

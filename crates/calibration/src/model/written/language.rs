@@ -43,8 +43,12 @@ const ENVELOPE: [(&str, Variable); 11] = [
     ("R", Variable::R),
     ("S", Variable::S),
 ];
-const MOMENT: [(&str, Variable); 3] =
-    [("t", Variable::Time), ("table", Variable::Table), ("precession", Variable::Precession)];
+const MOMENT: [(&str, Variable); 4] = [
+    ("t", Variable::Time),
+    ("table", Variable::Table),
+    ("precession", Variable::Precession),
+    ("warmer", Variable::Warmer),
+];
 const DRIVE: [(&str, Variable); 6] = [
     ("drive_x", Variable::DriveX),
     ("drive_y", Variable::DriveY),

@@ -209,7 +209,7 @@ impl EffectText {
     fn unfit(&self, effect: EffectId) -> Option<String> {
         let neutral: Values<f64> = effect.neutral();
         let drive = AxisForces { x_c: 0.3, x_s: -0.2, y_c: 0.1, y_s: 0.4 };
-        let at = Moment { t_s: 1.3, table_rad: 0.7, precession_rad_s: -2.0, drive };
+        let at = Moment { t_s: 1.3, table_rad: 0.7, precession_rad_s: -2.0, warmer_k: 4.0, drive };
         for e in probes() {
             let size = e.pendulum().e.sqrt();
             let left = match effect.description().stage {
@@ -384,6 +384,7 @@ fn admitted(text: &EffectText, compiled: Compiled, source: &str) -> &'static Wri
         steps.any(|step| matches!(step, Step::Variable(variable) if wanted(variable)))
     };
     let in_time = asks_for(|v| *v == Variable::Time);
+    let by_temperature = asks_for(|v| *v == Variable::Warmer);
     let on_commands = asks_for(Variable::is_of_the_drive);
     let maps: Vec<(Target, &'static [Step])> =
         compiled.maps.into_iter().map(|(target, steps)| (target, &*steps.leak())).collect();
@@ -391,6 +392,7 @@ fn admitted(text: &EffectText, compiled: Compiled, source: &str) -> &'static Wri
         description: description(text, compiled.stage, source),
         maps: maps.leak(),
         in_time,
+        by_temperature,
         on_commands,
         text: whole.leak(),
     }));

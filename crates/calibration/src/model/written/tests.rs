@@ -22,7 +22,7 @@ fn outputs(id: EffectId, p: &Values<f64>, e: &Envelope<f64>) -> Vec<Jet> {
     let p: Values<Jet> = std::array::from_fn(|i| Jet::unknown(p[i], i));
     let fixed = Jet::constant;
     let drive = AxisForces { x_c: 0.2, x_s: 0.1, y_c: -0.3, y_s: 0.05 };
-    let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, drive }.map(fixed);
+    let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, warmer_k: 4.0, drive }.map(fixed);
     let e = Envelope::new(fixed(e.x_c), fixed(e.x_s), fixed(e.y_c), fixed(e.y_s));
     let four = |e: Envelope<Jet>| vec![e.x_c, e.x_s, e.y_c, e.y_s];
     match id.description().stage {
@@ -111,7 +111,7 @@ fn admit(stage: &str, map: &str) -> Result<EffectId, String> {
 fn read(map: &str) -> Envelope<f64> {
     let e = Envelope::new(0.8, 0.03, 0.6, -0.02);
     let drive = AxisForces { x_c: 0.2, x_s: 0.1, y_c: -0.3, y_s: 0.05 };
-    let at = Moment { t_s: 2.0, table_rad: 0.5, precession_rad_s: -3.0, drive };
+    let at = Moment { t_s: 2.0, table_rad: 0.5, precession_rad_s: -3.0, warmer_k: 4.0, drive };
     admit("readout", map).unwrap().read(&[0.1, 0.0, 0.0, 0.0], e, &at)
 }
 

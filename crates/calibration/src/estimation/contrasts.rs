@@ -1,0 +1,99 @@
+//! In what the fitted runs of a campaign differ: rate, direction, speed, amplitude, temperature. What they have in common
+//! is what they can't tell apart.
+
+use crate::data::track::Track;
+use crate::estimation::identifiability::Alike;
+use crate::estimation::joint_fit::Dataset;
+use crate::recording::Role;
+
+/// Rates that differ by less than this share count as one.
+const SAME_RATE: f64 = 0.05;
+/// Amplitudes that differ by less than this share count as one.
+const SAME_AMPLITUDE: f64 = 0.05;
+/// A rate that changes by more than this share within a run varies.
+const VARYING_RATE: f64 = 0.2;
+/// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
+const STRETCHES: usize = 50;
+const EDGE: usize = 30;
+/// Temperatures that differ by less than this are one, K.
+const SAME_TEMPERATURE_K: f64 = 1.0;
+
+impl Dataset {
+    /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.
+    fn stretches(&self) -> Vec<Vec<f64>> {
+        let tracks = self.tracks.iter().map(|p| &p.track);
+        let mut rates: Vec<Vec<f64>> = tracks
+            .flat_map(|t| t.segments.iter().filter(|s| s.role == Role::Fit).map(move |s| (t, &s.range)))
+            .map(|(t, range)| {
+                let step = (range.len() / STRETCHES).max(1);
+                let ends = range.clone().step_by(step).zip(range.clone().skip(step).step_by(step));
+                ends.map(|(i, j)| (t.input_rad[j] - t.input_rad[i]) / (t.t_s[j] - t.t_s[i])).collect()
+            })
+            .collect();
+        let fastest = rates.iter().flatten().fold(0.0, |m: f64, r| m.max(r.abs()));
+        for r in &mut rates {
+            r.retain(|r| r.abs() > SAME_RATE * fastest);
+        }
+        rates
+    }
+
+    /// The rate changes within a fitted run, as in a turn there and back.
+    pub(crate) fn rate_varies(&self) -> bool {
+        self.stretches().into_iter().any(|mut rates| {
+            rates.sort_by(f64::total_cmp);
+            let tenth = rates.len() / 10;
+            !rates.is_empty() && {
+                let (low, high) = (rates[tenth], rates[rates.len() - 1 - tenth]);
+                high - low > VARYING_RATE * low.abs().max(high.abs())
+            }
+        })
+    }
+
+    /// The table turns both ways in what is fitted.
+    pub(crate) fn both_directions(&self) -> bool {
+        let rates = self.stretches();
+        let any = |sign: f64| rates.iter().flatten().any(|r| r * sign > 0.0);
+        any(1.0) && any(-1.0)
+    }
+
+    /// The table turns at two or more speeds in what is fitted.
+    pub(crate) fn speeds_differ(&self) -> bool {
+        let mut speeds: Vec<f64> = self.stretches().into_iter().flatten().map(f64::abs).collect();
+        speeds.sort_by(f64::total_cmp);
+        let edge = speeds.len() / EDGE;
+        !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
+    }
+
+    /// What the fitted runs have in common.
+    pub(crate) fn alike(&self) -> Alike {
+        let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
+        let ends = fitted
+            .map(|p| p.track.mean_amplitude())
+            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), a| (low.min(a), high.max(a)));
+        Alike {
+            direction: !self.both_directions(),
+            speed: !self.speeds_differ(),
+            amplitude: ends.1 < (1.0 + SAME_AMPLITUDE) * ends.0,
+            no_ring_downs: self.ring_down_runs.is_empty(),
+        }
+    }
+
+    /// Fitted runs were made at two or more rates, or in both directions.
+    pub(crate) fn tracks_differ(&self) -> bool {
+        self.both_directions() || self.speeds_differ()
+    }
+
+    /// Runs that differ tell what the drive does, where the quadrature tells the split of the frequencies from it.
+    pub(crate) fn tells_the_drive(&self) -> bool {
+        self.tracks_differ() && self.tracks.iter().any(|p| p.track.has_quadrature())
+    }
+
+    /// Every run has a temperature, and what is fitted was made at different ones.
+    pub(crate) fn temperature_varies(&self) -> bool {
+        let fitted = || self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0);
+        let (low, high) = fitted()
+            .flat_map(Track::temperatures_c)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high): (f64, f64), t| (low.min(t), high.max(t)));
+        self.tracks.iter().all(|p| p.track.temperatures_c().next().is_some()) && high - low > SAME_TEMPERATURE_K
+    }
+}
