@@ -347,16 +347,34 @@ fn correlations(plots: &PlotData) -> Option<Figure> {
         _ => name.to_owned(),
     };
     let names: Vec<String> = c.names.iter().map(|n| short(n)).collect();
-    let rows: Vec<Value> = c.rows.iter().map(|r| shorts(r.iter().copied())).collect();
+    let cells = || c.rows.iter().enumerate().flat_map(|(i, row)| row.iter().enumerate().map(move |(j, v)| (i, j, *v)));
+    let shapes: Vec<Value> = cells().map(|(i, j, v)| cell(i, j, v)).collect();
+    // what is pointed at is said by points that nobody sees
     let traces = vec![json!({
-        "type": "heatmap", "x": names, "y": names, "xgap": 1, "ygap": 1, "z": rows, "zmin": -1, "zmax": 1,
-        "colorscale": [[0.0, "#d55e00"], [0.5, "@zero"], [1.0, "#0072b2"]],
-        "hovertemplate": "%{x}<br>%{y}<br>%{z:.3f}<extra></extra>",
+        "type": "scatter", "mode": "markers", "x": cells().map(|(_, j, _)| j).collect::<Vec<_>>(),
+        "y": cells().map(|(i, ..)| i).collect::<Vec<_>>(), "marker": {"size": 16, "opacity": 0},
+        "text": cells().map(|(i, j, v)| format!("{}<br>{}<br>{v:.3}", names[j], names[i])).collect::<Vec<_>>(),
+        "hovertemplate": "%{text}<extra></extra>",
     })];
+    let places: Vec<usize> = (0..names.len()).collect();
+    let end = names.len() as f64 - 0.5;
     let layout = json!({
-        "xaxis": {"tickangle": -40, "showgrid": false}, "yaxis": {"autorange": "reversed", "showgrid": false},
-        "margin": {"l": 170, "r": 16, "t": 16, "b": 130},
+        "xaxis": {"tickangle": -40, "showgrid": false, "zeroline": false, "tickvals": places, "ticktext": names,
+                  "range": [-0.5, end]},
+        "yaxis": {"showgrid": false, "zeroline": false, "tickvals": places, "ticktext": names, "range": [end, -0.5]},
+        "margin": {"l": 170, "r": 16, "t": 16, "b": 130}, "shapes": shapes, "showlegend": false,
     });
-    let caption = "Of everything that was fitted. Near ±1 the data tell only a combination of the two.";
+    let caption = "Of everything that was fitted: blue where two go together, red where one goes against the other, the fuller \
+                   the closer to ±1, where the data tell only a combination of the two.";
     Some(Figure::new("correlations", "Correlations", caption, traces, layout).wide())
+}
+
+/// A correlation as a rectangle, the fuller the stronger.
+fn cell(row: usize, column: usize, value: f64) -> Value {
+    let (x, y) = (column as f64, row as f64);
+    json!({
+        "type": "rect", "layer": "below", "x0": x - 0.48, "x1": x + 0.48, "y0": y - 0.48, "y1": y + 0.48,
+        "fillcolor": if value < 0.0 { "@raw" } else { "@declared" }, "opacity": short(value.abs().min(1.0)),
+        "line": {"width": 0},
+    })
 }

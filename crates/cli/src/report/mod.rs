@@ -1,7 +1,7 @@
 //! `report.html`: the report for a person, in one file that needs no network.
 //!
 //! The page is plain HTML that can be read, searched and printed as it is; the figures are data beside it, drawn by
-//! Plotly, whose script comes with its crate and is part of the file.
+//! Plotly's basic bundle (`assets/README.md`), which is part of the file.
 
 mod figures;
 mod finding;
@@ -12,7 +12,6 @@ mod tables;
 use std::fmt::Write as _;
 
 use cvg_calibration::Identification;
-use plotly::Plot;
 use serde_json::Value;
 
 use self::figures::Figure;
@@ -21,6 +20,8 @@ use crate::{Failure, clouds, commands, output};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
+/// Lines, points, bars and shapes: a quarter of what all of Plotly weighs.
+const PLOTLY: &str = include_str!("../../assets/plotly-basic.min.js");
 /// Nothing is fetched, whatever a name in a recording says.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:";
 /// Points of the still picture for readers without scripts.
@@ -30,7 +31,7 @@ const STILL_POINTS: usize = 600;
 pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     let r = &identified.report;
     let figures = figures::all(identified);
-    let mut h = String::with_capacity(6 << 20);
+    let mut h = String::with_capacity(2 << 20);
     begin(&mut h, &r.device, &r.instrument);
     headline(&mut h, identified);
     warnings(&mut h, &r.warnings);
@@ -78,18 +79,11 @@ fn finish(h: &mut String, json: &str, schema: &str, footer: &str, figures: &[Fig
     // no text within a script may end it, or begin another
     let _ = writeln!(
         h,
-        "<script type=\"application/json\" id=\"figures\">{}</script>{}<script>{SCRIPT}</script></body></html>",
-        data.replace('<', "\\u003c"),
-        plotly_script()
+        "<script type=\"application/json\" id=\"figures\">{}</script><script type=\"text/javascript\">{PLOTLY}</script>\
+         <script>{SCRIPT}</script></body></html>",
+        data.replace('<', "\\u003c")
     );
     Ok(())
-}
-
-/// Plotly alone; the formula renderer that the crate puts behind it is not needed.
-fn plotly_script() -> String {
-    let both = Plot::offline_js_sources();
-    const END: &str = "</script>";
-    both.find(END).map_or(both.clone(), |at| both[..at + END.len()].to_owned())
 }
 
 fn headline(h: &mut String, identified: &Identification) {
@@ -172,12 +166,15 @@ fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::plotly_script;
+    use super::PLOTLY;
 
     #[test]
-    fn the_script_of_the_figures_is_one_and_whole() {
-        let script = plotly_script();
-        assert_eq!((script.matches("<script").count(), script.matches("</script>").count()), (1, 1));
-        assert!(script.len() > 1_000_000 && script.contains("plotly.js v"), "{} bytes", script.len());
+    fn the_script_of_the_figures_is_the_one_that_is_described_and_does_not_end_its_element() {
+        assert!(!PLOTLY.contains("</script") && !PLOTLY.contains("<!--"));
+        let described = include_str!("../../assets/README.md");
+        let version = PLOTLY.split_once("(basic - minified) v").and_then(|(_, rest)| rest.lines().next());
+        let version = version.expect("a version");
+        let sum = format!("{:08x}", crc32fast::hash(PLOTLY.as_bytes()));
+        assert!(described.contains(&format!("Version {version}, CRC-32 {sum}")), "{version} {sum}");
     }
 }

@@ -6,9 +6,9 @@
   // Okabe and Ito; the darker ones are lightened on a dark page
   const inks = {
     light: { "@raw": "#d55e00", "@declared": "#0072b2", "@discovered": "#009e73", "@4": "#cc79a7", "@5": "#e69f00",
-      "@6": "#56b4e9", "@7": "#333333", "@muted": "#777777", "@band": "rgba(120,120,120,0.18)", "@zero": "#f5f5f5" },
+      "@6": "#56b4e9", "@7": "#333333", "@muted": "#777777", "@band": "rgba(120,120,120,0.18)" },
     dark: { "@raw": "#ff8c3a", "@declared": "#56b4e9", "@discovered": "#2fd3a4", "@4": "#e9a3c9", "@5": "#f0c14b",
-      "@6": "#9ad5ff", "@7": "#dddddd", "@muted": "#a0a0a0", "@band": "rgba(200,200,200,0.18)", "@zero": "#22272b" },
+      "@6": "#9ad5ff", "@7": "#dddddd", "@muted": "#a0a0a0", "@band": "rgba(200,200,200,0.18)" },
   };
   const NARROW_PX = 600;
   const prefersDark = matchMedia("(prefers-color-scheme: dark)");
@@ -16,9 +16,8 @@
   const theme = () => chosen || (prefersDark.matches ? "dark" : "light");
   const inked = (value, ink) => {
     if (typeof value === "string") return ink[value] || value;
-    // data have no colours; a step of a colour scale is a number and one
-    if (Array.isArray(value))
-      return typeof value[0] === "number" && typeof value[1] !== "string" ? value : value.map((v) => inked(v, ink));
+    // data have no colours
+    if (Array.isArray(value)) return typeof value[0] === "number" ? value : value.map((v) => inked(v, ink));
     if (value && typeof value === "object")
       return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, inked(v, ink)]));
     return value;
@@ -35,7 +34,6 @@
     if (figure.id === "correlations" && (width || innerWidth) < NARROW_PX) {
       layout.xaxis = { ...layout.xaxis, showticklabels: false };
       layout.margin = { l: 150, r: 8, t: 16, b: 24 };
-      traces[0].showscale = false;
     }
     return {
       traces,

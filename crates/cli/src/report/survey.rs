@@ -19,7 +19,7 @@ pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     let r = &surveyed.report;
     let figures: Vec<Figure> =
         [circle(surveyed), radius(surveyed), r.allan.as_ref().map(deviation)].into_iter().flatten().collect();
-    let mut h = String::with_capacity(6 << 20);
+    let mut h = String::with_capacity(2 << 20);
     begin(&mut h, &r.device, r.instrument);
     headline(&mut h, r);
     warnings(&mut h, &r.warnings);
