@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use cvg_model::Envelope;
 use cvg_model::effects::EffectId;
-use cvg_simulator::scenario::{EffectSetting, Purpose, Run};
+use cvg_simulator::scenario::{EffectSetting, Purpose, Run, Temperature};
 use cvg_simulator::{Settings, SimulatedRun};
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,12 +25,29 @@ const DRAWN: [EffectId; 10] = [
     EffectId::TableHarmonic,
     EffectId::TimePeriodic,
 ];
+/// What the electronics add that only a split or a thermometer tells: drawn first on [`ELECTRONICS`].
+const OF_ELECTRONICS: [EffectId; 3] = [EffectId::DetectionPhase, EffectId::DriveFeedthrough, EffectId::Temperature];
 /// How many effects a campaign gets: none in one of six, two in two of six.
 const COUNTS: [usize; 6] = [0, 1, 1, 1, 2, 2];
 /// rms of the drawn signature over the noise floor of the held-out angle.
 const SIGNATURE: [f64; 2] = [2.0, 50.0];
 /// The largest skew of a drive that is drawn, whatever its signature is.
 const LARGEST_ACTUATION_SKEW: f64 = 0.3;
+
+/// What campaigns are drawn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Bench {
+    /// split of the frequencies, Hz
+    split_hz: [f64; 2],
+    /// the first effect is one of these; the others are any of those that every bench has
+    first: &'static [EffectId],
+}
+
+/// A balanced device: the effects that any campaign tells.
+pub const BALANCED: Bench = Bench { split_hz: [0.0, 0.05], first: &[] };
+/// A device with a split that makes the commands go with the angle, at temperatures that differ from run to run.
+pub const ELECTRONICS: Bench = Bench { split_hz: [0.05, 0.4], first: &OF_ELECTRONICS };
+
 /// Shape of an undeclared effect: everything but its size.
 struct Shape {
     id: EffectId,
@@ -39,6 +56,8 @@ struct Shape {
     table_harmonic: f64,
     frequency_hz: f64,
     largest_readout_v: f64,
+    /// shares of the four factors of a feed-through
+    shares: [f64; 4],
 }
 
 impl Shape {
@@ -49,6 +68,7 @@ impl Shape {
             EffectId::DetectionOffset | EffectId::SpringCubic => effect(self.id, &[size * cos, size * sin]),
             EffectId::TableHarmonic => effect(self.id, &[self.table_harmonic, size * cos, size * sin]),
             EffectId::TimePeriodic => effect(self.id, &[self.frequency_hz, size * cos, size * sin]),
+            EffectId::DriveFeedthrough => effect(self.id, &self.shares.map(|share| size * share)),
             EffectId::DetectionSaturation => effect(self.id, &[(1.0 + size) / self.largest_readout_v]),
             _ => effect(self.id, &[self.sign * size]),
         }
@@ -90,11 +110,11 @@ pub struct Setup {
     pub drawn: Vec<Drawn>,
 }
 
-/// The campaign of a seed.
+/// The campaign of a seed on a bench.
 ///
 /// # Panics
 /// Where the paper's scenario has other runs than those that are drawn here.
-pub fn setup(seed: u64) -> Setup {
+pub fn setup(bench: &Bench, seed: u64) -> Setup {
     let mut draw = Draws::new(seed);
     let mut settings = plain_paper();
     let detection = draw.between(0.97, 1.03);
@@ -105,7 +125,12 @@ pub fn setup(seed: u64) -> Setup {
     settings.noise_v = draw.scale(1e-5, 1e-4);
     settings.effects = vec![
         polar(EffectId::Anisodamping, draw.between(0.0, 0.008), draw.angle_deg(), 2.0),
-        polar(EffectId::Anisoelasticity, TAU * draw.between(0.0, 0.05), draw.angle_deg(), 2.0),
+        polar(
+            EffectId::Anisoelasticity,
+            TAU * draw.between(bench.split_hz[0], bench.split_hz[1]),
+            draw.angle_deg(),
+            2.0,
+        ),
         effect(EffectId::ActuationGainMismatch, &[draw.between(0.97, 1.03)]),
         effect(EffectId::DetectionGainMismatch, &[detection]),
     ];
@@ -126,18 +151,27 @@ pub fn setup(seed: u64) -> Setup {
             }
         }
     }
+    if bench.first.contains(&EffectId::Temperature) {
+        let [start_c, drift_k_per_s, step_k] =
+            [(15.0, 35.0), (-0.02, 0.02), (-4.0, 4.0)].map(|(a, b)| draw.between(a, b));
+        settings.temperature = Some(Temperature { start_c, drift_k_per_s, step_k, reference_c: 25.0 });
+    }
     let mut ids: Vec<EffectId> = DRAWN.to_vec();
+    let mut first = bench.first.to_vec();
     let mut drawn = Vec::new();
     for _ in 0..COUNTS[draw.below(COUNTS.len())] {
         let ratio = draw.scale(SIGNATURE[0], SIGNATURE[1]);
+        let from = if first.is_empty() { &mut ids } else { &mut first };
         let shape = Shape {
-            id: ids.swap_remove(draw.below(ids.len())),
+            id: from.swap_remove(draw.below(from.len())),
             direction_deg: draw.angle_deg(),
             sign: if draw.below(2) == 0 { 1.0 } else { -1.0 },
             table_harmonic: 1.0 + draw.below(4) as f64,
             frequency_hz: draw.scale(0.3, 30.0),
             largest_readout_v: settings.amplitude_v * detection.max(1.0),
+            shares: if bench.first.is_empty() { [0.0; 4] } else { std::array::from_fn(|_| draw.between(-1.0, 1.0)) },
         };
+        first.clear();
         let effect = of_signature(&settings, &shape, ratio);
         drawn.push(Drawn { effect, signature: signature(&settings, &recorded(&settings, None), effect) });
         settings.effects.push(effect);
