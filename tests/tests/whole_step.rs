@@ -3,9 +3,12 @@
 
 use core::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-use cvg_controller::{Fault, PiState};
+use cvg_controller::{ActuationCompensation, Allocation, Fault, OrbitCommands, Pi, PiState};
+use cvg_estimator::{LockState, PhaseLock, Precession, PrecessionState};
 use cvg_instrument::{Instrument, Mode, Settings, State, Wish};
 use cvg_model::effects::{EffectId, Values};
+use cvg_model::{ControlOutputs, Pendulum};
+use cvg_tests::domain::patterns;
 use cvg_tests::{Scalar, for_each_scalar};
 use proptest::prelude::*;
 use rand::{Rng, RngExt, SeedableRng};
@@ -188,6 +191,51 @@ for_each_scalar! {
         prop_assert!(steps >= 1, "no control step");
         prop_assert_eq!(beyond(&settings, &state), None, "{:?}", state);
     }
+
+    //= specs/dsp.md#short-way
+    //= type=test
+    //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
+    /// The parts that have one, for any bits; `crates/instrument` compares the step itself.
+    #[test]
+    fn prop_the_short_way_of_a_part_leaves_what_its_step_leaves(
+        v in prop::array::uniform8(patterns::<T>()), near in prop::array::uniform8(-1.0..1.0_f64), far in prop::array::uniform8(any::<bool>()),
+    ) {
+        // half of them any bits, half of them of a size that occurs
+        let [a, b, c, d, e, q, r, l] = core::array::from_fn(|i| if far[i] { v[i] } else { T::from_f64(near[i]) });
+        let t = T::from_f64;
+        let pi = Pi::new(t(3.0), t(0.02), t(5e-4), t(1.5)).expect("inside its domain");
+        let (mut short, mut long) = (PiState { integral: a }, PiState { integral: a });
+        match pi.energy_within(&mut short, e, b) {
+            Some(volts) => prop_assert_eq!((volts, short), (pi.energy(&mut long, e, b).volts, long)),
+            None => prop_assert_eq!(word(&short), word(&long)),
+        }
+        let lock = PhaseLock::new(t(20.0), t(0.7), t(1e-3), t(5.0)).expect("inside its domain");
+        let p = Pendulum { e, q, r, s: c, l };
+        let (mut short, mut long) = (LockState { detuning_rad_s: b }, LockState { detuning_rad_s: b });
+        match lock.step_within(&mut short, &p) {
+            Some(rad_s) => prop_assert_eq!((rad_s, short), (lock.step(&mut long, &p).rad_s, long)),
+            None => prop_assert_eq!(word(&short), word(&long)),
+        }
+        let tracker = Precession::new(5e-4, 8e-3, 35.0, 0.1, 3e-4, 1e-9).expect("inside its domain");
+        let before = PrecessionState { cos_2: a, sin_2: b, sin_2_per_window: d, half_turns: 3 };
+        let mut short = before;
+        if !tracker.step_steadily(&mut short, &p) {
+            prop_assert_eq!(word(&short), word(&before));
+        }
+        let drives = ActuationCompensation::new(&[(EffectId::ActuationGainMismatch, [t(1.02), t(0.0), t(0.0), t(0.0)])]);
+        for inverse in [None, drives.ok()] {
+            let allocation = Allocation::new(inverse, t(1.2)).expect("a limit");
+            let (cos, sin) = (t(near[6]), t(near[7]));
+            let short = allocation.axes_within(&ControlOutputs { v_as: a, v_qc: b }, cos, sin);
+            let long = allocation.step(&OrbitCommands { v_as: a, v_qs: t(0.0), v_qc: b, v_ac: t(0.0) }, cos, sin);
+            prop_assert_eq!(short, if long.status == cvg_controller::Status::Within { Some(long.volts) } else { None });
+        }
+    }
+}
+
+/// As text, in which what is no number equals itself.
+fn word(state: &impl core::fmt::Debug) -> String {
+    format!("{state:?}")
 }
 
 #[test]

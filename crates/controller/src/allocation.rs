@@ -76,8 +76,8 @@ impl<T: Float> ActuationCompensation<T> {
 /// The allocation's configuration; it has no state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allocation<T> {
-    compensation: Option<ActuationCompensation<T>>,
-    limit_v: T,
+    pub(crate) compensation: Option<ActuationCompensation<T>>,
+    pub(crate) limit_v: T,
 }
 
 /// Commands of the drives.
@@ -135,6 +135,8 @@ impl<T: Float> Allocation<T> {
         if self.fits(&asked) { Some(asked) } else { None }
     }
 
+    //= specs/dsp.md#short-way
+    //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
     /// The same for the energy and the quadrature loop alone, which is **Equation 9**.
     #[inline(always)]
     pub fn axes_within(&self, v: &ControlOutputs<T>, cos: T, sin: T) -> Option<AxisForces<T>> {
@@ -152,7 +154,7 @@ impl<T: Float> Allocation<T> {
 
     /// What is asked of the drives.
     #[inline(always)]
-    fn asked(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> AxisForces<T> {
+    pub(crate) fn asked(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> AxisForces<T> {
         let projected = AxisForces {
             x_c: v.v_ac * cos - v.v_qc * sin,
             x_s: v.v_as * cos - v.v_qs * sin,
@@ -173,7 +175,7 @@ impl<T: Float> Allocation<T> {
     /// The drives' commands where a channel is asked for more than the limit, or for no number.
     #[cold]
     #[inline(never)]
-    fn limited(&self, asked: AxisForces<T>) -> Drive<T> {
+    pub(crate) fn limited(&self, asked: AxisForces<T>) -> Drive<T> {
         let finite = asked.x_c.is_finite() && asked.x_s.is_finite() && asked.y_c.is_finite() && asked.y_s.is_finite();
         Drive {
             volts: AxisForces {

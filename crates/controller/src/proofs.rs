@@ -8,5 +8,6 @@ pub mod allocation;
 pub mod endings;
 pub mod pi;
 pub mod rate;
+pub mod short_way;
 pub mod supervisor;
 pub mod way_back;

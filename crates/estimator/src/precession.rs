@@ -113,11 +113,16 @@ impl<T: Float> Precession<T> {
             return false;
         }
         let scale = T::one() / line;
-        let (cos_2, sin_2) = (p.r * scale, p.s * scale);
+        self.turn_steadily(state, p.r * scale, p.s * scale)
+    }
+
+    /// Follows a direction that has moved steadily. False, and nothing changed, elsewhere.
+    #[inline(always)]
+    pub(crate) fn turn_steadily(&self, state: &mut PrecessionState<T>, cos_2: T, sin_2: T) -> bool {
         let (along, across) = state.turn(cos_2, sin_2);
         let sin_2_per_window = state.smoothed(self.share, across);
         // false for any NaN; the state may hold anything
-        let steady = (along - T::one()).within(T::half())
+        let steady = (along - T::one()).within(T::ratio(3, 8))
             && across.within(self.jump_sin_2)
             && sin_2 * state.sin_2 > T::zero()
             && sin_2_per_window.within(self.jump_sin_2);
@@ -138,7 +143,12 @@ impl<T: Float> Precession<T> {
             return Movement::Unknown;
         }
         let scale = T::one() / line;
-        let (cos_2, sin_2) = (p.r * scale, p.s * scale);
+        self.turn_anyhow(state, p.r * scale, p.s * scale)
+    }
+
+    /// Follows a direction, however it has moved.
+    #[inline(always)]
+    pub(crate) fn turn_anyhow(&self, state: &mut PrecessionState<T>, cos_2: T, sin_2: T) -> Movement {
         let (before_cos, before_sin) = (state.cos_2, state.sin_2);
         let (along, across) = state.turn(cos_2, sin_2);
         (state.cos_2, state.sin_2) = (cos_2, sin_2);

@@ -10,6 +10,7 @@ pub mod demodulator;
 pub mod direction;
 pub mod oscillator;
 pub mod precession;
+pub mod short_way;
 
 use cvg_model::{Envelope, Float, Pendulum};
 use kani::Arbitrary;

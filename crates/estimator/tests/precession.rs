@@ -145,6 +145,11 @@ fn a_state_that_is_no_direction_is_no_last_direction() {
     for (cos_2, sin_2) in [(0.5, 0.0), (0.0, 0.5), (2.1, 0.0), (0.0, 0.0), (f64::NAN, 0.0), (f64::INFINITY, 1.0)] {
         assert_eq!(movement(cos_2, sin_2), (Movement::Unknown, 0.0), "{cos_2} {sin_2}");
     }
+    // nor is one of exactly half the length to the short way, which would go on from it
+    let p = Pendulum { r: 0.6, s: 0.8, ..line(0.0) };
+    let mut state = PrecessionState { cos_2: 0.3, sin_2: 0.4, sin_2_per_window: 0.0, half_turns: 0 };
+    assert!(!tracker().step_steadily(&mut state, &p));
+    assert_eq!(tracker().step(&mut state, &p), Movement::Unknown);
     assert_eq!(movement(2.0, 0.0).0, Movement::Steady);
     assert_eq!(movement(0.51, 0.0).0, Movement::Steady);
     assert_eq!(movement(0.3, 0.3).0, Movement::Steady);
@@ -181,10 +186,10 @@ fn the_short_way_is_a_steady_move_on_one_side_of_the_axis() {
         assert!(refused(at(0.4), &Pendulum { r: no_number, ..line(0.4) }));
         assert!(refused(at(0.4), &Pendulum { s: no_number, ..line(0.4) }));
     }
-    // a state of half to three halves of a unit vector is a direction, and its rate has to be one
+    // a state of five to eleven eighths of a unit vector is a direction, and its rate has to be one
     let sized = |size: f64| PrecessionState { cos_2: 0.6 * size, sin_2: 0.8 * size, ..PrecessionState::default() };
     let same = Pendulum { e: 4.0, q: 0.0, r: 2.4, s: 3.2, l: 0.0 };
-    for (size, expected) in [(0.49, true), (0.51, false), (1.49, false), (1.51, true)] {
+    for (size, expected) in [(0.62, true), (0.63, false), (1.37, false), (1.38, true)] {
         assert_eq!(refused(sized(size), &same), expected, "{size}");
     }
     for rate in [0.8, -0.8, f64::NAN] {

@@ -16,6 +16,6 @@ pub(crate) fn put_out<T: Float>(limit_v: T, d: &AxisForces<T>, cos: T, sin: T) -
 
 #[cold]
 #[inline(never)]
-fn limited<T: Float>(limit_v: T, x: T, y: T) -> (T, T) {
+pub(crate) fn limited<T: Float>(limit_v: T, x: T, y: T) -> (T, T) {
     (x.bounded(limit_v), y.bounded(limit_v))
 }

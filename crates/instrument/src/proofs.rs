@@ -6,3 +6,4 @@
 
 pub mod continuity;
 pub mod drives;
+pub mod short_way;

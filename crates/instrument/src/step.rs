@@ -83,7 +83,7 @@ impl<T: Float> Instrument<T> {
         let window = Window { last: (x, y), ..state.window };
         let now = window.fingerprint();
         // the sums of two windows are seldom the same
-        let usual = window.clipped == 0 && now[0] != state.fingerprint[0] && now[1] != state.fingerprint[1];
+        let usual = window.clipped == 0 && unlike(&now, &state.fingerprint);
         let readout = match self.demodulator.envelope(&window, &state.phasor) {
             Some(readout) if usual => readout,
             _ => return self.last_otherwise(state, x, y, cos, sin),
@@ -155,6 +155,8 @@ impl<T: Float> Instrument<T> {
         }
     }
 
+    //= specs/dsp.md#short-way
+    //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
     /// The control step of nearly every window, in whole-angle mode or hold: nothing is amiss, nothing at a limit. None, and
     /// nothing changed, elsewhere; [`Instrument::control`] does the same at every window.
     #[inline(always)]
@@ -405,7 +407,13 @@ fn in_operation(mode: Mode) -> bool {
 
 /// A channel's samples are those of the last window, to the last bit, and not all nothing.
 #[inline]
-fn repeats<T: Float>([sum_x, sum_y, now_x, now_y]: &[T; 4], [x, y, last_x, last_y]: &[T; 4]) -> bool {
+pub(crate) fn repeats<T: Float>([sum_x, sum_y, now_x, now_y]: &[T; 4], [x, y, last_x, last_y]: &[T; 4]) -> bool {
     let zero = T::zero();
     (sum_x == x && now_x == last_x && *now_x != zero) || (sum_y == y && now_y == last_y && *now_y != zero)
+}
+
+/// Neither channel's sum is that of the last window: no channel repeats it.
+#[inline(always)]
+pub(crate) fn unlike<T: Float>(now: &[T; 4], before: &[T; 4]) -> bool {
+    now[0] != before[0] && now[1] != before[1]
 }

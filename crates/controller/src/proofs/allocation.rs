@@ -6,7 +6,7 @@ use kani::Arbitrary;
 use crate::{ActuationCompensation, Allocation, OrbitCommands, Status};
 
 /// Any allocation that can be built, with any compensation, and its limit.
-fn any_allocation<T: Float + Arbitrary>() -> (Allocation<T>, T) {
+pub(super) fn any_allocation<T: Float + Arbitrary>() -> (Allocation<T>, T) {
     let inverse = ActuationCompensation { xx: kani::any(), xy: kani::any(), yx: kani::any(), yy: kani::any() };
     let limit_v = kani::any();
     // precondition: a configuration that `new` accepts

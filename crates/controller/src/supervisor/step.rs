@@ -73,6 +73,8 @@ impl<T: Float> Supervisor<T> {
         if state.trying >= self.budget { Some(fault) } else { None }
     }
 
+    //= specs/dsp.md#short-way
+    //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
     /// Whether all that [`Supervisor::step`] does after a window with the pendulum variables `p`, of which nothing else is
     /// amiss, is to [count](SupervisorState::count) it: whole angle or hold goes on as it is.
     #[inline(always)]

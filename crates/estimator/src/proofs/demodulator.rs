@@ -6,7 +6,7 @@ use kani::Arbitrary;
 use crate::{Demodulator, Phasor, Window};
 
 /// A demodulator for any number of samples, for converters of ±2.5 V, and its range.
-fn any_demodulator<T: Float>() -> (Demodulator<T>, T) {
+pub(super) fn any_demodulator<T: Float>() -> (Demodulator<T>, T) {
     // precondition: a configuration that `new` accepts
     match Demodulator::new(kani::any(), 2.5) {
         Ok(demodulator) => (demodulator, T::ratio(5, 2)),
@@ -17,7 +17,7 @@ fn any_demodulator<T: Float>() -> (Demodulator<T>, T) {
     }
 }
 
-fn any_phasor<T: Float + Arbitrary>() -> Phasor<T> {
+pub(super) fn any_phasor<T: Float + Arbitrary>() -> Phasor<T> {
     Phasor { cos: kani::any(), sin: kani::any(), step_cos: kani::any(), step_sin: kani::any() }
 }
 

@@ -7,7 +7,7 @@ use super::any_pendulum;
 use crate::{LockState, Oscillator, PhaseLock, Phasor, Status};
 
 /// Any loop that could be built, and its limit.
-fn any_lock<T: Float + Arbitrary>() -> (PhaseLock<T>, T) {
+pub(super) fn any_lock<T: Float + Arbitrary>() -> (PhaseLock<T>, T) {
     // precondition: gains and a limit that `new` accepts
     let positive = || kani::any_where(|v: &T| *v > T::zero() && v.is_finite());
     let lock = PhaseLock { gain_per_s: positive(), integral_gain_per_s: positive(), limit_rad_s: positive() };

@@ -7,7 +7,7 @@ use super::any_pendulum;
 use crate::{Direction, Movement, Precession, PrecessionState, Status};
 
 /// Any tracker that could be built.
-fn any_precession<T: Float + Arbitrary>() -> Precession<T> {
+pub(super) fn any_precession<T: Float + Arbitrary>() -> Precession<T> {
     // precondition: shares of one, jumps below 45°, leads below ten windows
     let share = |most: T| kani::any_where(|v: &T| *v >= T::zero() && *v <= most);
     // precondition: positive times and amplitudes

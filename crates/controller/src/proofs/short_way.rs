@@ -1,0 +1,167 @@
+//! The short way of nearly every window against the way of all: the same to the last bit, part by part.
+//!
+//! What the step calls on its short way is compared with what it calls otherwise.
+
+use cvg_model::{ControlOutputs, Float};
+use kani::Arbitrary;
+
+use super::allocation::any_allocation;
+use super::pi::any_controller;
+use super::supervisor::{any_state, any_supervisor};
+use crate::supervisor::{Mode, Observation, Orders, SupervisorState};
+use crate::{Allocation, OrbitCommands, PiState, Status};
+
+/// The same to the last bit, or both no number. The conversion is exact.
+fn same<T: Float>(a: T, b: T) -> bool {
+    a.to_f64().to_bits() == b.to_f64().to_bits() || a.partial_cmp(&a).is_none() && b.partial_cmp(&b).is_none()
+}
+
+/// `kept(before, after)`: the integral that the short way is claimed to leave.
+fn loops_are_the_same<T: Float + Arbitrary>(kept: impl Fn(T, T) -> T) {
+    let (pi, _) = any_controller::<T>();
+    let before = PiState { integral: kani::any() };
+    let (mut short, mut long) = (before, before);
+    let (measured, set): (T, T) = (kani::any(), kani::any());
+    let (within, all) = if kani::any() {
+        (pi.energy_within(&mut short, measured, set), pi.energy(&mut long, measured, set))
+    } else {
+        (pi.quadrature_within(&mut short, measured), pi.quadrature(&mut long, measured))
+    };
+    match within {
+        Some(volts) => {
+            kani::cover!(volts < T::zero() && long.integral > before.integral, "the short way");
+            assert!(all.status == Status::Within && same(volts, all.volts));
+            assert!(same(short.integral, kept(before.integral, long.integral)));
+        }
+        None => {
+            kani::cover!(all.status == Status::Limited, "the long way");
+            assert!(same(short.integral, before.integral));
+        }
+    }
+}
+
+//= specs/dsp.md#short-way
+//# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
+/// Where [`Pi::energy_within`] and [`Pi::quadrature_within`] answer, they give the volts and leave the integral of
+/// [`Pi::energy`] and [`Pi::quadrature`] to the last bit; where they don't, the integral is as it was: for any
+/// controller, any errors and any bits of the integral.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_loops_are_the_same_f32() {
+    loops_are_the_same(|_: f32, after| after);
+}
+
+/// The integral is claimed to stay.
+#[kani::proof]
+#[kani::should_panic]
+#[kani::solver(minisat)]
+pub fn twin_loops_are_the_same_f32() {
+    loops_are_the_same(|before: f32, _| before);
+}
+
+fn supervision_is_the_same<T: Float + Arbitrary>(windows: impl Fn(&SupervisorState) -> u32) {
+    let supervisor = any_supervisor::<T>();
+    let before = any_state();
+    let pendulum =
+        cvg_model::Pendulum { e: kani::any(), q: kani::any(), r: kani::any(), s: kani::any(), l: kani::any() };
+    let goes_on = supervisor.goes_on(&before, &pendulum);
+    let (mut short, mut long) = (before, before);
+    short.count();
+    let well = Observation { pendulum, valid: true, clipped: false, repeats: false, jumped: false };
+    let orders = supervisor.step(&mut long, &well, None);
+    kani::cover!(goes_on && before.mode == Mode::Hold, "a hold goes on");
+    kani::cover!(goes_on && before.bad > 0, "what was counted stays so");
+    kani::cover!(!goes_on && before.mode == Mode::WholeAngle, "the long way");
+    if goes_on {
+        kani::cover!(before.windows == u32::MAX, "at the end of what can be counted");
+        assert!(long == short && long.windows == windows(&short));
+        assert!(orders == Orders::Run { hold: before.mode == Mode::Hold, ring_down: false });
+        assert!(crate::Supervisor::in_phase(&pendulum));
+    }
+}
+
+//= specs/dsp.md#short-way
+//# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
+/// Where [`Supervisor::goes_on`] says so, [`Supervisor::step`] after a window of which nothing is amiss gives the orders of
+/// the mode, counts the window and changes nothing else, and the phase is near: for any supervisor, state and vibration.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_supervision_is_the_same_f32() {
+    supervision_is_the_same::<f32>(|state| state.windows);
+}
+
+/// The window is claimed not to be counted.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_supervision_is_the_same_f32() {
+    supervision_is_the_same::<f32>(|state| state.windows.saturating_sub(1));
+}
+
+/// `same(a, b)`: what is claimed of a force that the short way gives and the one of the long way.
+fn forces_are_the_same<T: Float + Arbitrary>(same: impl Fn(T, T) -> bool) {
+    // precondition: a configuration that `new` accepts; a compensation multiplies and adds what is the same
+    let limit_v = kani::any_where(|l: &T| *l > T::zero() && l.is_finite());
+    let allocation = Allocation { compensation: None, limit_v };
+    // precondition: a direction of finite components, as the one ahead is, which is proved beside
+    let finite = || kani::any_where(|v: &T| v.is_finite());
+    let (cos, sin): (T, T) = (finite(), finite());
+    let v = ControlOutputs { v_as: kani::any(), v_qc: kani::any() };
+    let short = allocation.axes_within(&v, cos, sin);
+    let asked = OrbitCommands { v_as: v.v_as, v_qs: T::zero(), v_qc: v.v_qc, v_ac: T::zero() };
+    let long = allocation.step(&asked, cos, sin);
+    kani::cover!(short.is_none() && long.status == Status::Limited, "the long way");
+    assert!(short.is_some() == (long.status == Status::Within));
+    if let Some(f) = short {
+        kani::cover!(f.y_c > T::zero() && f.x_s < T::zero(), "the short way");
+        assert!(same(f.x_c, long.volts.x_c) && same(f.x_s, long.volts.x_s));
+        assert!(same(f.y_c, long.volts.y_c) && same(f.y_s, long.volts.y_s));
+    }
+}
+
+//= specs/dsp.md#short-way
+//# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
+/// [`Allocation::axes_within`] answers where [`Allocation::step`] is within its limits and nowhere else, with the same forces but
+/// for the sign of zero: without a compensation, for any commands, any limit and any direction of finite components.
+#[kani::proof]
+pub fn proof_forces_are_the_same_f32() {
+    forces_are_the_same(|a: f32, b| a == b);
+}
+
+/// The sign of zero is claimed to be the same.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_forces_are_the_same_f32() {
+    forces_are_the_same(|a: f32, b| same(a, b));
+}
+
+/// `answers(a, b)`: what is claimed of the short way's force and of the one that the limits leave.
+fn limits_leave_what_is_within<T: Float + Arbitrary>(answers: impl Fn(T, T) -> bool) {
+    let (allocation, _) = any_allocation::<T>();
+    let commands = OrbitCommands { v_as: kani::any(), v_qs: kani::any(), v_qc: kani::any(), v_ac: kani::any() };
+    let (cos, sin) = (kani::any(), kani::any());
+    let short = allocation.step_within(&commands, cos, sin);
+    let long = allocation.limited(allocation.asked(&commands, cos, sin));
+    kani::cover!(short.is_none() && long.volts.x_c == T::zero(), "the long way");
+    if let Some(f) = short {
+        kani::cover!(f.y_c > T::zero() && f.x_s < T::zero(), "the short way");
+        assert!(answers(f.x_c, long.volts.x_c) && answers(f.x_s, long.volts.x_s));
+        assert!(answers(f.y_c, long.volts.y_c) && answers(f.y_s, long.volts.y_s));
+    }
+}
+
+//= specs/dsp.md#short-way
+//# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
+/// Where [`Allocation::step_within`] answers, [`Allocation::limited`] of the same forces leaves them, to the last bit: for any
+/// bits of commands and direction.
+#[kani::proof]
+pub fn proof_limits_leave_what_is_within_f32() {
+    limits_leave_what_is_within(|a: f32, b| same(a, b));
+}
+
+/// A force is claimed to be below the other.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_limits_leave_what_is_within_f32() {
+    limits_leave_what_is_within(|a: f32, b| a < b);
+}
