@@ -26,6 +26,9 @@
 
 pub mod continuity;
 mod drives;
+#[cfg(test)]
+#[path = "margins/tests.rs"]
+mod margins;
 #[cfg(any(kani, test, cvg_prove))]
 pub mod proofs;
 pub mod settings;

@@ -13,6 +13,7 @@ macro_rules! in_both_precisions {
 
 mod commands;
 mod half_turns;
+mod readers;
 mod refusals;
 
 use core::f64::consts::TAU;
