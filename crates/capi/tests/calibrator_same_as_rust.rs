@@ -49,6 +49,11 @@ fn both() -> (CalibratorMemory, LearnedMemory, Calibrator<f32>, State<f32>) {
     (calibrator, learned, rust, state)
 }
 
+fn learned(l: &mut LearnedMemory) -> &mut State<f32> {
+    // SAFETY: what the library has written there
+    unsafe { &mut *(&raw mut *l).cast::<State<f32>>() }
+}
+
 /// A step of a pattern that turns, each number other than every other.
 fn control(n: u32) -> Control {
     let theta = 0.002 * n as f32;
@@ -71,7 +76,14 @@ fn control(n: u32) -> Control {
 
 #[test]
 fn c_learns_what_rust_learns() {
-    let (c, mut l, rust, mut state) = both();
+    let (c, mut l, rust, _) = both();
+    // something is known of everything
+    let mut values = [0.0; _];
+    for (n, value) in values.iter_mut().enumerate() {
+        *value = 1e-3 + 1e-4 * n as f32;
+    }
+    let mut state = rust.start_from(&values).expect("a device");
+    *learned(&mut l) = state;
     let bits = |v: Four| [v.x_c, v.x_s, v.y_c, v.y_s].map(f32::to_bits);
     for n in 0..30_000 {
         let k = control(n);
@@ -89,6 +101,7 @@ fn c_learns_what_rust_learns() {
         if n % 100 != 0 {
             continue;
         }
+        assert!(*learned(&mut l) == state, "another state after {n} steps");
         let (four, e) = (Four { x_c: 0.7, x_s: 0.1, y_c: -0.4, y_s: 0.2 }, Envelope::new(0.7, 0.1, -0.4, 0.2));
         // SAFETY: the same
         let (readout, drives, forward, not_rotation) = unsafe {
@@ -106,6 +119,7 @@ fn c_learns_what_rust_learns() {
         let f = rust.forward(&state, k.cos, k.sin, 0.8);
         let asked = Added { v_qs: f.precession_v, v_qc: f.quadrature_v, detuning_rad_s: f.detuning_rad_s };
         assert_eq!(forward, asked);
+        assert!(asked.v_qs != asked.v_qc && asked.v_qc != asked.detuning_rad_s, "{asked:?}");
         assert_eq!(not_rotation.to_bits(), rust.not_rotation(&state, &p, (k.cos, k.sin), &commands).to_bits());
     }
     // SAFETY: the same

@@ -165,3 +165,12 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn an_integral_that_is_primed_beyond_the_limit_is_at_its_limit() {
+    let pi = pi();
+    assert_eq!(pi.primed(2.0 * LIMIT_V), pi.primed(LIMIT_V));
+    assert_eq!(pi.primed(-f64::INFINITY), pi.primed(-LIMIT_V));
+    assert_eq!(pi.primed(f64::NAN), PiState::default());
+    assert!(pi.primed(0.5 * LIMIT_V).integral < pi.primed(LIMIT_V).integral);
+}

@@ -66,3 +66,17 @@ pub fn phase_ahead<T: Float>(e: &Envelope<T>) -> (T, T) {
     let (cos, sin) = crate::nco::half_angle(cos_2, sin_2);
     if cos.is_finite() && sin.is_finite() { (cos, sin) } else { (T::one(), T::zero()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Beat, Envelope};
+
+    #[test]
+    fn windows_are_counted_to_the_end_of_the_count_and_stay_there() {
+        let mut beat = Beat { windows: u32::MAX - 1, ..Beat::<f32>::default() };
+        for _ in 0..3 {
+            beat.add(&Envelope::new(1.0, 0.0, 0.0, 0.0));
+            assert_eq!(beat.windows(), u32::MAX);
+        }
+    }
+}

@@ -79,3 +79,17 @@ fn what_is_no_direction_is_the_x_axis_and_says_why() {
         assert_eq!((d.cos, d.sin, d.status), (1.0, 0.0, status), "{e:?} {cos_2} {sin_2}");
     }
 }
+
+/// A unit vector of the machine may be longer than one.
+#[test]
+fn a_direction_that_rounding_made_too_long_is_one_still() {
+    fn one<T: Float>() {
+        let e = Envelope::new(T::one(), T::zero(), T::zero(), T::zero());
+        for (units, sin_2) in [(1, T::zero()), (2, T::zero()), (0, T::epsilon())] {
+            let d = major_axis_of(&e, T::one() + T::ratio(units, 1) * T::epsilon(), sin_2);
+            assert!((d.cos - T::one()).magnitude() <= T::epsilon() && d.status == Status::Valid, "{units}: {d:?}");
+        }
+    }
+    one::<f32>();
+    one::<f64>();
+}

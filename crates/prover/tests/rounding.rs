@@ -97,6 +97,44 @@ fn the_machine_never_errs_by_more_than_the_bound_and_sometimes_by_half_of_it() {
     assert!(most32 > 0.3, "{most32}: a bound that is never approached hides what it bounds");
 }
 
+/// One operation, or few, on numbers of any size.
+fn few<T: Real>(which: u32, a: T, b: T) -> T {
+    match which % 7 {
+        0 => a * b,
+        1 => a / b,
+        2 => (a * a + b * b).sqrt(),
+        3 => a * a - b * b,
+        4 => T::half() * a * T::half() * b,
+        5 => a.sqrt() * b,
+        _ => (a + b) / (a - b),
+    }
+}
+
+/// From subnormal numbers to the largest there are: a bound that is given holds there too.
+#[test]
+fn the_machine_never_errs_by_more_than_the_bound_at_the_ends_of_its_range() {
+    let mut state = 12_345_u64;
+    let mut any = || loop {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let value = f32::from_bits((state >> 32) as u32);
+        if value.is_finite() {
+            return value;
+        }
+    };
+    let mut given = 0;
+    for which in 0..200_000 {
+        let (a, b) = (any(), any());
+        let [x, y] = [a, b].map(|v| Rounded::<f32>::input(Interval::point(f64::from(v))));
+        let (enclosed, machine) = (few(which, x, y), f64::from(few(which, a, b)));
+        if enclosed.error.is_finite() {
+            given += 1;
+            let gap = (enclosed.real.lo - machine).max(machine - enclosed.real.hi).max(0.0);
+            assert!(gap <= enclosed.error, "{which}: {a:e} {b:e} give {machine:e}, {enclosed:?}");
+        }
+    }
+    assert!(given > 50_000, "{given} bounds");
+}
+
 /// 2⁻²⁰⁰: fixed-point numbers that are far finer than either scalar.
 const BITS: usize = 200;
 

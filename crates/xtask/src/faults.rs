@@ -6,6 +6,7 @@
 
 mod calibrator;
 mod controller;
+mod edges;
 mod estimator;
 mod instrument;
 mod model;
@@ -45,7 +46,8 @@ const fn fault(
 
 /// Every fault of the library.
 fn library() -> Vec<Fault> {
-    [model::FAULTS, estimator::FAULTS, controller::FAULTS, calibrator::FAULTS, instrument::FAULTS].concat()
+    [model::FAULTS, estimator::FAULTS, controller::FAULTS, calibrator::FAULTS, instrument::FAULTS, edges::FAULTS]
+        .concat()
 }
 
 /// What came of a fault.

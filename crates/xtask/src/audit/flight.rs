@@ -181,6 +181,28 @@ mod tests {
         assert!(flight.is_empty(), "{flight:#?}");
     }
 
+    /// The repository as it is, but for one citation more, on a function that nobody calls there.
+    #[test]
+    fn a_requirement_that_is_put_on_what_nobody_calls_is_a_fault() {
+        use super::super::{claims, gate, record};
+        let repository = crate::repository();
+        let calls = calls(&repository).expect("readable");
+        let found = |name: &str, place: &str| {
+            let mut named = claims::read(&repository).expect("readable");
+            let (name, place) = (name.to_owned(), place.to_owned());
+            let called = calls.get(&(name.clone(), place.clone())).cloned();
+            let functions = named.functions.get_mut("specs/dsp.md#short-way").expect("cited");
+            functions.push(claims::Meets { name, place, called });
+            let results = record::Results::default();
+            let record = record::Record::assemble(&named, &results);
+            let all = gate::faults(&record, &named, &results);
+            all.into_iter().filter(|f| f.contains("in the instrument")).collect::<Vec<_>>().join("\n")
+        };
+        let uncalled = found("major_axis", "crates/estimator/src/direction.rs");
+        assert!(uncalled.contains("short-way: nobody calls major_axis"), "{uncalled}");
+        assert_eq!(found("major_axis_of", "crates/estimator/src/direction.rs"), "");
+    }
+
     #[test]
     fn the_instrument_tracks_its_pattern_by_precession_and_not_by_the_angle() {
         let found = calls(&crate::repository()).expect("readable");

@@ -49,8 +49,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the delay is undone without the detuning",
         STEP,
-        "let more = correction_rad_s * self.delay_s;",
-        "let more = T::zero() * correction_rad_s * self.delay_s;",
+        "first order\n        let more = correction_rad_s * self.delay_s;",
+        "first order\n        let more = T::zero() * correction_rad_s * self.delay_s;",
         JOINED,
     ),
     fault(
