@@ -147,14 +147,14 @@ impl<T: Float> Allocation<T> {
 
     /// Each is within the limit. False for any NaN.
     #[inline(always)]
-    fn fits(&self, f: &AxisForces<T>) -> bool {
+    pub(crate) fn fits(&self, f: &AxisForces<T>) -> bool {
         let fits = |v: T| v.within(self.limit_v);
         fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && fits(f.y_s)
     }
 
     /// What is asked of the drives.
     #[inline(always)]
-    pub(crate) fn asked(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> AxisForces<T> {
+    fn asked(&self, v: &OrbitCommands<T>, cos: T, sin: T) -> AxisForces<T> {
         let projected = AxisForces {
             x_c: v.v_ac * cos - v.v_qc * sin,
             x_s: v.v_as * cos - v.v_qs * sin,

@@ -2,7 +2,7 @@
 //!
 //! What the step calls on its short way is compared with what it calls otherwise.
 
-use cvg_model::{ControlOutputs, Float};
+use cvg_model::{AxisForces, ControlOutputs, Float};
 use kani::Arbitrary;
 
 use super::allocation::any_allocation;
@@ -135,15 +135,13 @@ pub fn twin_forces_are_the_same_f32() {
     forces_are_the_same(|a: f32, b| same(a, b));
 }
 
-/// `answers(a, b)`: what is claimed of the short way's force and of the one that the limits leave.
+/// `answers(a, b)`: what is claimed of a force that the short way gives and of the one that the limits leave.
 fn limits_leave_what_is_within<T: Float + Arbitrary>(answers: impl Fn(T, T) -> bool) {
     let (allocation, _) = any_allocation::<T>();
-    let commands = OrbitCommands { v_as: kani::any(), v_qs: kani::any(), v_qc: kani::any(), v_ac: kani::any() };
-    let (cos, sin) = (kani::any(), kani::any());
-    let short = allocation.step_within(&commands, cos, sin);
-    let long = allocation.limited(allocation.asked(&commands, cos, sin));
-    kani::cover!(short.is_none() && long.volts.x_c == T::zero(), "the long way");
-    if let Some(f) = short {
+    let f = AxisForces { x_c: kani::any(), x_s: kani::any(), y_c: kani::any(), y_s: kani::any() };
+    let long = allocation.limited(f);
+    kani::cover!(!allocation.fits(&f) && long.volts.x_c == T::zero(), "the long way");
+    if allocation.fits(&f) {
         kani::cover!(f.y_c > T::zero() && f.x_s < T::zero(), "the short way");
         assert!(answers(f.x_c, long.volts.x_c) && answers(f.x_s, long.volts.x_s));
         assert!(answers(f.y_c, long.volts.y_c) && answers(f.y_s, long.volts.y_s));
@@ -152,8 +150,8 @@ fn limits_leave_what_is_within<T: Float + Arbitrary>(answers: impl Fn(T, T) -> b
 
 //= specs/dsp.md#short-way
 //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
-/// Where [`Allocation::step_within`] answers, [`Allocation::limited`] of the same forces leaves them, to the last bit: for any
-/// bits of commands and direction.
+/// Forces that [`Allocation::fits`] lets [`Allocation::step_within`] give, [`Allocation::limited`] leaves as they are, to the last
+/// bit: for any bits of forces and any limit.
 #[kani::proof]
 pub fn proof_limits_leave_what_is_within_f32() {
     limits_leave_what_is_within(|a: f32, b| same(a, b));
