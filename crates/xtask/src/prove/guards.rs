@@ -185,3 +185,84 @@ pub fn proof_guard_loops_are_counted() {
 pub fn twin_guard_loops_are_counted() {
     loops_are_counted();
 }
+
+fn conversions_saturate(beyond: i32) {
+    let x: f32 = kani::any();
+    let whole = black_box(x) as i32;
+    kani::cover!(x > 1e10, "beyond what an integer holds");
+    assert!(x == x || whole == 0);
+    assert!(!(x > 3e9) || whole == beyond);
+    assert!(!(x < -3e9) || whole == i32::MIN);
+}
+
+/// What a float is as an integer ends at the integer's ends, and is nothing for no number.
+#[kani::proof]
+pub fn proof_guard_conversions_saturate() {
+    conversions_saturate(i32::MAX);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_conversions_saturate() {
+    conversions_saturate(i32::MAX - 1);
+}
+
+fn no_number_keeps_its_sign(sign: u32) {
+    let bits: u32 = kani::any();
+    let x = f32::from_bits(bits);
+    kani::cover!(x != x, "no number");
+    assert!((-black_box(x)).to_bits() == bits ^ sign);
+    assert!(black_box(x).abs().to_bits() == bits & 0x7fff_ffff);
+}
+
+/// A sign that is turned round or taken away is one bit, of any bits.
+#[kani::proof]
+pub fn proof_guard_no_number_keeps_its_sign() {
+    no_number_keeps_its_sign(0x8000_0000);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_no_number_keeps_its_sign() {
+    no_number_keeps_its_sign(0);
+}
+
+fn quotients_overflow(least: i64) {
+    let b: i64 = kani::any_where(|b| *b != 0);
+    let a: i64 = kani::any_where(|a| *a >= least);
+    kani::cover!(b == -1 && a == least, "the least by minus one");
+    let _ = black_box(black_box(a) / black_box(b));
+}
+
+/// A quotient that no integer holds panics, and only that one.
+#[kani::proof]
+pub fn proof_guard_quotients_overflow() {
+    quotients_overflow(i64::MIN + 1);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_quotients_overflow() {
+    quotients_overflow(i64::MIN);
+}
+
+fn ends_of_the_range_are_kept(least: f32) {
+    let small: f32 = kani::any_where(|x| *x == f32::MIN_POSITIVE);
+    kani::cover!(small > 0.0, "the smallest normal number");
+    assert!(black_box(small) / 2.0 > least && (black_box(small) / 2.0) * 2.0 == small);
+    let large: f32 = kani::any_where(|x| *x == f32::MAX);
+    let none = black_box(large) * 2.0 - black_box(large) * 2.0;
+    assert!(black_box(large) * 2.0 == f32::INFINITY && none != none);
+}
+
+/// Quotients become subnormal and products infinite, and the difference of infinities is no number.
+#[kani::proof]
+pub fn proof_guard_ends_of_the_range_are_kept() {
+    ends_of_the_range_are_kept(0.0);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_guard_ends_of_the_range_are_kept() {
+    ends_of_the_range_are_kept(1.0);
+}
