@@ -11,12 +11,13 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 20] = [
+const IDS: [&str; 21] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
     "detection-offset",
     "detection-cubic",
+    "detection-quintic",
     "detection-saturation",
     "drive-feedthrough",
     "temperature",

@@ -51,7 +51,11 @@ fn demo_writes_report_and_calibration() {
     assert_eq!(undeclared(&report), ["detection-cubic"]);
     let html = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(html.contains("<svg") && html.contains("detection-cubic"), "a page with a figure");
-    assert!(html.len() < 2_000_000, "a report that goes into a mail, with all that its figures need: {} bytes", html.len());
+    assert!(
+        html.len() < 2_000_000,
+        "a report that goes into a mail, with all that its figures need: {} bytes",
+        html.len()
+    );
     assert!(fs::read_to_string(out.join("calibration.toml")).unwrap().contains("detection-cubic"));
     let unfinished = support::contents(&out).into_keys().filter(|p| p.extension().is_some_and(|e| e == "part"));
     assert_eq!(unfinished.count(), 0);

@@ -14,6 +14,7 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
     let [u, v, w, _] = unit;
     match id.description().id {
         "detection-cubic" => [0.08 * u, 0.04 * v, 0.0, 0.0],
+        "detection-quintic" => [0.04 * u, 0.0, 0.0, 0.0],
         "detection-skew" => [1.5 * u, 0.0, 0.0, 0.0],
         "detection-phase" => [0.4 * u, 0.0, 0.0, 0.0],
         "drive-feedthrough" => unit.map(|u| 0.1 * u),

@@ -371,6 +371,7 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
     let angle = ["harmonic-n", "time-periodic", "angle-latency"];
     let channels = [
         "detection-cubic",
+        "detection-quintic",
         "detection-skew",
         "detection-gain-mismatch",
         "gain-drift",
@@ -395,6 +396,34 @@ fn channels_of_unequal_lag_turn_their_phasors_apart_by_it() {
     let (x_c, x_s) = turned(VIBRATION.x_c, VIBRATION.x_s, 0.5 * phase);
     let (y_c, y_s) = turned(VIBRATION.y_c, VIBRATION.y_s, -0.5 * phase);
     reads(EffectId::DetectionPhase, [phase, 0.0, 0.0, 0.0], Envelope::new(x_c, x_s, y_c, y_s), 1e-15);
+}
+
+#[test]
+fn a_quintic_readout_is_the_first_harmonic_of_the_fifth_power() {
+    // of x + κ₅x⁵ at the size m, over a period
+    let (kappa, n) = (0.05, 64);
+    let first = |m: f64| {
+        let value = |i: u32| m * (TAU * f64::from(i) / f64::from(n)).cos();
+        let sum: f64 = (0..n).map(|i| (value(i) + kappa * value(i).powi(5)) * value(i) / m).sum();
+        2.0 * sum / f64::from(n)
+    };
+    let e = VIBRATION;
+    let [x, y] = [e.x_c.hypot(e.x_s), e.y_c.hypot(e.y_s)].map(|m| first(m) / m);
+    let expected = Envelope::new(x * e.x_c, x * e.x_s, y * e.y_c, y * e.y_s);
+    reads(EffectId::DetectionQuintic, [kappa, 0.0, 0.0, 0.0], expected, 1e-12);
+}
+
+#[test]
+fn a_quintic_readout_is_undone_to_rounding() {
+    for k in [0.08, -0.08, 0.02, -1e-3] {
+        let values = [k / 0.625, 0.0, 0.0, 0.0];
+        for m in [1.0, 0.7] {
+            let read = EffectId::DetectionQuintic.read(&values, Envelope::new(m, 0.0, 0.0, -m), &now());
+            let z = EffectId::DetectionQuintic.unread(&values, read, &now());
+            // k of the readout, which the inverse sees, is up to half as large again
+            assert!((z.x_c - m).abs() < 4e-16 && (z.y_s + m).abs() < 4e-16, "{k} {m}: {z:?}");
+        }
+    }
 }
 
 #[test]

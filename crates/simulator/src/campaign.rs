@@ -105,6 +105,13 @@ fn decimals(column: &Column) -> usize {
     }
 }
 
+impl Scenario {
+    /// Simulates every run.
+    pub fn simulate(&self) -> Simulated {
+        Simulated::new(self)
+    }
+}
+
 impl Simulated {
     /// Simulates every run of `scenario`.
     pub fn new(scenario: &Scenario) -> Self {

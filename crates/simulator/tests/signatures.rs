@@ -53,6 +53,15 @@ fn detection_offset_is_a_first_harmonic_that_shrinks_with_the_amplitude() {
 }
 
 #[test]
+fn detection_quintic_is_a_sine_of_4_theta_that_grows_with_the_fourth_power_of_the_amplitude() {
+    for amplitude in [1.0, 0.6] {
+        let keys = format!("amplitude_v = {amplitude:?}");
+        let run = rotation_with(&keys, r#"{ id = "detection-quintic", kappa_5 = 0.004 }"#, 500.0, 10.0);
+        close(angle_harmonics(&run, &[4.0])[0].sin, -5.0 / 32.0 * 0.004 * f64::powi(amplitude, 4));
+    }
+}
+
+#[test]
 fn detection_cubic_is_a_sine_of_4_theta_that_grows_with_the_square_of_the_amplitude() {
     for amplitude in [1.0, 0.6] {
         let keys = format!("amplitude_v = {amplitude:?}");

@@ -127,7 +127,8 @@ pub(crate) fn propagate(
         let along = start.angle
             + start.drift * (track.t_s[i] - track.t_s[segment.range.start])
             + sense * hypothesis.angular_gain * input;
-        let off = wrapped(vibration.theta - along - integrals.ahead(track.t_s[i]), hypothesis.period_rad);
+        let precessed = integrals.reaching(track.t_s[i], vibration.theta_rate);
+        let off = wrapped(vibration.theta - along - precessed, hypothesis.period_rad);
         if hypothesis.instrument == Instrument::Gyroscope {
             let believed = off.abs() <= stepping.spike || integrals.known == 0 || passed_over == MOST_PASSED_OVER;
             passed_over = if believed { 0 } else { passed_over + 1 };
@@ -232,9 +233,6 @@ impl Held {
     }
 }
 
-/// Beyond so many intervals the last integrand is all that is believed of the next.
-const EXTRAPOLATED: f64 = 5.0;
-
 /// Running integrals of sampled quantities: the Adams–Moulton rule of fourth order on even samples, the trapezium
 /// where the spacing changes.
 struct Integrals {
@@ -245,45 +243,54 @@ struct Integrals {
     known: usize,
 }
 
+/// A step of an integral, with its interval over the rule's denominator.
+#[derive(Clone, Copy)]
+enum Rule {
+    AdamsMoulton(f64),
+    Trapezium(f64),
+}
+
+impl Rule {
+    /// What the step adds, from the integrand at its end and at the last three samples, newest first.
+    #[inline]
+    fn step(self, f: f64, [p1, p2, p3]: [f64; 3]) -> f64 {
+        match self {
+            Self::AdamsMoulton(k) => k * (9.0 * f + 19.0 * p1 - 5.0 * p2 + p3),
+            Self::Trapezium(k) => k * (f + p1),
+        }
+    }
+}
+
 impl Integrals {
     fn new(n: usize) -> Self {
         Self { sum: vec![0.0; n], past: [vec![0.0; n], vec![0.0; n], vec![0.0; n]], times: [0.0; 3], known: 0 }
     }
 
-    /// The first of them at a time not far ahead, from what is known so far: the parabola through the last integrands, so
-    /// that what a split does to a fast pattern between samples is not taken for a spike.
-    fn ahead(&self, t: f64) -> f64 {
+    /// The first of them at a later time, with the integrand `f` of then: as precise as the integral itself, so that what a
+    /// split does to a fast pattern between samples is not taken for a spike.
+    fn reaching(&self, t: f64, f: f64) -> f64 {
         if self.known == 0 {
             return self.sum[0];
         }
-        let since = t - self.times[0];
-        let [now, before, earlier] = [0, 1, 2].map(|i| self.past[i].first().copied().unwrap_or(0.0));
-        let (h1, h2) = (self.times[0] - self.times[1], self.times[1] - self.times[2]);
-        let straight = self.sum[0] + since * now;
-        if self.known < 3 || since > EXTRAPOLATED * h1 {
-            return straight;
-        }
-        let (slope, slope_before) = ((now - before) / h1, (before - earlier) / h2);
-        let bend = (slope - slope_before) / (h1 + h2);
-        straight + since * since * (0.5 * slope + bend * (since / 3.0 + 0.5 * h1))
+        let first = |past: &[f64]| past.first().copied().unwrap_or(0.0);
+        self.sum[0] + self.rule(t).step(f, self.past.each_ref().map(|past| first(past)))
+    }
+
+    /// How a step to `t` is made.
+    fn rule(&self, t: f64) -> Rule {
+        let h = t - self.times[0];
+        let even = self.known == 3
+            && ((self.times[0] - self.times[1]) - h).abs() < 0.01 * h
+            && ((self.times[1] - self.times[2]) - h).abs() < 0.01 * h;
+        if even { Rule::AdamsMoulton(h / 24.0) } else { Rule::Trapezium(0.5 * h) }
     }
 
     fn extend_to(&mut self, t: f64, f: &[f64]) {
         if self.known > 0 {
-            let h = t - self.times[0];
-            let even = self.known == 3
-                && ((self.times[0] - self.times[1]) - h).abs() < 0.01 * h
-                && ((self.times[1] - self.times[2]) - h).abs() < 0.01 * h;
+            let rule = self.rule(t);
             let [p1, p2, p3] = &self.past;
-            if even {
-                let k = h / 24.0;
-                for (i, s) in self.sum.iter_mut().enumerate() {
-                    *s += k * (9.0 * f[i] + 19.0 * p1[i] - 5.0 * p2[i] + p3[i]);
-                }
-            } else {
-                for (i, s) in self.sum.iter_mut().enumerate() {
-                    *s += 0.5 * h * (f[i] + p1[i]);
-                }
+            for (i, s) in self.sum.iter_mut().enumerate() {
+                *s += rule.step(f[i], [p1[i], p2[i], p3[i]]);
             }
         }
         self.past.rotate_right(1);
@@ -372,21 +379,20 @@ mod tests {
         }
     }
 
-    /// A split of 0.4 Hz whose quadrature a fast pattern swings at 4.3 Hz, in rows 10 ms apart: each row is believed to within
-    /// a residual's noise, and none is taken for a spike.
+    /// A split of 0.4 Hz whose quadrature a fast pattern swings at 4.3 Hz, in rows 10 ms apart: where the pattern will be is
+    /// known to within a sample's noise, from the second row on.
     #[test]
     fn what_a_split_does_between_samples_is_foreseen() {
         let (size, turning) = (0.054, 27.0);
         let mut integrals = Integrals::new(1);
         for i in 0..200 {
             let t = 0.01 * f64::from(i);
-            let off = integrals.ahead(t) - size / turning * (1.0 - (turning * t).cos());
-            assert!(i < 3 || off.abs() < 1.5e-5, "{i}: {off}");
-            integrals.extend_to(t, &[size * (turning * t).sin()]);
+            let f = size * (turning * t).sin();
+            let off = integrals.reaching(t, f) - size / turning * (1.0 - (turning * t).cos());
+            assert!(off.abs() < 5e-6, "{i}: {off}");
+            integrals.extend_to(t, &[f]);
+            assert!((integrals.sum[0] - off - size / turning * (1.0 - (turning * t).cos())).abs() < 1e-15, "{i}");
         }
-        // after a gap nothing is foreseen but the last rate
-        let (sum, now) = (integrals.sum[0], integrals.past[0][0]);
-        assert!((integrals.ahead(integrals.times[0] + 1.0) - sum - now).abs() < 1e-12);
     }
 
     #[test]

@@ -17,6 +17,9 @@ const TABLE_HARMONICS: u32 = 64;
 /// Strongest harmonics that become candidates.
 const PROPOSALS: usize = 3;
 
+/// The lowest power of the amplitude at which a readout bends the angle.
+const LOWEST_POWER: i8 = 2;
+
 /// A way to extend a hypothesis.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Candidate {
@@ -43,7 +46,9 @@ pub(crate) fn candidates(
         let d = id.description();
         let unseen = (d.stage == Stage::Actuation || id.seen_by_loops()) && !loops;
         let unmeasured = id.by_temperature() && !dataset.temperature_varies();
-        if d.declared || unseen || unmeasured || (sensor && !d.in_sensors) {
+        // a higher power of the amplitude is a lower one where there is one amplitude
+        let unresolved = d.scaling.amplitude > LOWEST_POWER && dataset.alike().amplitude;
+        if d.declared || unseen || unmeasured || unresolved || (sensor && !d.in_sensors) {
             continue;
         }
         if d.scaling.rate > 0 && !dataset.rate_varies() {

@@ -20,6 +20,7 @@ pub mod detection_cubic;
 pub mod detection_gain_mismatch;
 pub mod detection_offset;
 pub mod detection_phase;
+pub mod detection_quintic;
 pub mod detection_saturation;
 pub mod detection_skew;
 pub mod drive_feedthrough;
@@ -486,6 +487,7 @@ library! {
     TimePeriodic => time_periodic::TimePeriodic,
     AngleLatency => angle_latency::AngleLatency,
     DetectionCubic => detection_cubic::DetectionCubic,
+    DetectionQuintic => detection_quintic::DetectionQuintic,
     DetectionSkew => detection_skew::DetectionSkew,
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,

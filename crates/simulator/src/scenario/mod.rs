@@ -11,7 +11,6 @@ use cvg_estimator::{Compensation, PhaseLock};
 use cvg_model::effects::Stage;
 use cvg_model::resonator::{Anisotropy, Resonator};
 
-use crate::campaign::Simulated;
 use crate::closed_loop::{ClosedLoop, Course, Design, samples};
 use crate::flicker::{Flicker, Wander};
 use crate::noise::Noise;
@@ -89,11 +88,6 @@ impl Scenario {
     /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
-    }
-
-    /// Simulates every run.
-    pub fn simulate(&self) -> Simulated {
-        Simulated::new(self)
     }
 
     /// The loop of the run at `index`, warmed up, at t = 0; `None` for a sensor or where there is no such run.
