@@ -18,7 +18,7 @@ use super::unknown::{Cells, UnknownColumn};
 /// Makes the recording of a table.
 pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let mut warnings = std::mem::take(&mut table.warnings);
-    convert(&mut table, naming, source, &mut warnings)?;
+    let readout_unit = convert(&mut table, naming, source, &mut warnings)?;
     if table.rows == 0 && table.truncated.is_none() {
         return Err(ReadError::NoRows { path: source.to_path_buf(), place: table.header });
     }
@@ -49,12 +49,18 @@ pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<
     set_aside(&mut table, bare, &mut warnings);
     dropped.missing_values.retain(|(channel, _)| table.numbers.iter().any(|column| column.channel == *channel));
     say(&table, &dropped, &mut warnings);
-    Ok(assemble(table, source, dropped, warnings))
+    Ok(Recording { readout_unit, ..assemble(table, source, dropped, warnings) })
 }
 
 /// Takes every column to the unit of its channel: by the factor of the mapping, else by the unit that the file states below
-/// the name, else by that in the name.
-fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec<String>) -> Result<(), ReadError> {
+/// the name, else by that in the name. Gives the unit that a readout is kept in, where that is not of volts.
+fn convert(
+    table: &mut Table,
+    naming: &Naming,
+    source: &Path,
+    warnings: &mut Vec<String>,
+) -> Result<Option<String>, ReadError> {
+    let mut kept = None;
     let is_readout = |channel| matches!(channel, Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys);
     let of_readout: Vec<&str> = table.units.iter().filter(|(c, _)| is_readout(*c)).map(|(_, u)| u.as_str()).collect();
     let is_one = of_readout.windows(2).all(|pair| pair[0] == pair[1]);
@@ -75,6 +81,7 @@ fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec
                 // a sensor's channels may be in any unit that both have
                 None if is_readout(channel) && is_one => {
                     warnings.push(format!("`{channel}` is in {unit} and kept in it"));
+                    kept = Some(units::bare(unit).to_owned());
                     continue;
                 }
                 None => {
@@ -96,7 +103,7 @@ fn convert(table: &mut Table, naming: &Naming, source: &Path, warnings: &mut Vec
         }
         column.values.iter_mut().for_each(|value| *value = by.of(*value));
     }
-    Ok(())
+    Ok(kept)
 }
 
 /// Puts the integral over time, from zero on, in the place of rates that are mapped to an angle.

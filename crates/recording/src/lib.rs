@@ -82,6 +82,8 @@ pub struct Recording {
     pub fy_v: Option<Vec<f64>>,
     /// Frequency that the envelope refers to, Hz, where it was demodulated from `x_v` and `y_v`.
     pub reference_hz: Option<f64>,
+    /// The unit of the readout, where the file states one that is not of volts: counts, a field.
+    pub readout_unit: Option<String>,
     /// Columns of unknown meaning, in the order of the file.
     pub unknown: Vec<UnknownColumn>,
     /// Names of all columns in the order in which they are written: first those named here, then the others that are

@@ -4,8 +4,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use cvg_recording::{Campaign, Channel, Place, Recording, Tally, UnknownColumn};
+use cvg_recording::{Campaign, Channel, Naming, Place, Recording, Tally, UnknownColumn};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -188,5 +189,43 @@ proptest! {
         bytes[at] = byte;
         fs::write(&path, bytes).unwrap();
         let _ = Recording::read(&path);
+    }
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn time_stamps_in_parquet_are_times_counted_from_the_first() {
+    use parquet::data_type::{DoubleType, Int64Type};
+    use parquet::file::writer::SerializedFileWriter;
+    let folder = TempDir::new().unwrap();
+    for (unit, ticks) in [("MILLIS", 1e3), ("MICROS", 1e6), ("NANOS", 1e9)] {
+        let schema = format!(
+            "message m {{ required int64 t_s (TIMESTAMP({unit},true)); required double xc_v; required double yc_v; }}"
+        );
+        let schema = parquet::schema::parser::parse_message_type(&schema).unwrap();
+        let path = folder.path().join(format!("{unit}.parquet"));
+        let file = fs::File::create(&path).unwrap();
+        let mut writer = SerializedFileWriter::new(file, schema.into(), Arc::default()).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        // March 2026, a row every 20 ms: in nanoseconds more digits than a number has
+        let first = 1_772_366_400i64 * ticks as i64 + 1;
+        let stamps: Vec<i64> = (0..3).map(|i| first + i * (ticks as i64) / 50).collect();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&stamps, None, None).unwrap();
+        column.close().unwrap();
+        for values in [[1.0, 0.0, -1.0], [0.0, 1.0, 0.0]] {
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<DoubleType>().write_batch(&values, None, None).unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+        writer.close().unwrap();
+        let recording = Recording::read(&path).unwrap();
+        let wanted = [0.0, 0.02, 0.04];
+        assert!(recording.t_s.iter().zip(wanted).all(|(t, w)| (t - w).abs() < 1e-12), "{unit}: {:?}", recording.t_s);
+        assert!(recording.warnings.iter().any(|w| w.contains("time stamps")), "{:?}", recording.warnings);
+        let mut scaled = Naming::default();
+        scaled.add("t_s=t_s*0.001").unwrap();
+        assert!(Recording::read_named(&path, &scaled).unwrap_err().to_string().contains("has a factor"));
     }
 }

@@ -96,6 +96,7 @@ fn channels_in_counts_or_in_a_field_are_kept_in_it_together() {
     let recording = read("t_s,xc_v,yc_v\ns,counts,counts\n0,100,0\n1,0,100\n", &[]).unwrap();
     assert_eq!(recording.xc_v.as_deref(), Some(&[100.0, 0.0][..]));
     assert_warns(&recording, "`xc_v` is in counts and kept in it");
+    assert_eq!(recording.readout_unit.as_deref(), Some("counts"));
     let said = refusal("t_s,xc_v,yc_v\ns,uT,mT\n0,100,0\n1,0,100\n", &[]);
     assert!(said.contains("`xc_v` is in \"uT\"; wanted V"), "{said}");
 }
@@ -133,6 +134,42 @@ fn a_labview_file_is_read_below_what_it_says_of_itself() {
         assert_warns(&recording, "`xc_v` is in Millivolts and taken to V");
         assert_eq!(recording.unknown[0].cells.iter().collect::<Vec<_>>(), ["start", "", ""]);
     }
+}
+
+#[test]
+fn the_times_that_labview_leaves_out_are_counted() {
+    let blank =
+        |row: &str| row.replacen("0,000000", "", 1).replacen("\n0,100000", "\n", 1).replacen("\n0,200000", "\n", 1);
+    let (above, rows) = LABVIEW
+        .replace("X_Columns\tOne", "X_Columns\tNo")
+        .split_once("X_Value")
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
+    let text = above.clone() + "X_Value" + &blank(&rows);
+    let names = ["t_s=X_Value", "xc_v=Sin", "yc_v=Cos"];
+    let recording = read(&text, &names).unwrap();
+    assert_eq!((recording.t_s.len(), recording.t_s[0], recording.t_s[2]), (3, 0.0, 0.2));
+    assert_warns(&recording, "X_Columns is No: `t_s` is counted from 0 in steps of 0.1");
+    let said = refusal(&text.replace("Delta_X\t0,100000\t0,100000", "Delta_X\t0,1\t0,2"), &names);
+    assert!(said.contains("differ from column to column") && said.contains("X_Columns One"), "{said}");
+    let said = refusal(&text.replace("Delta_X\t0,100000\t0,100000\t\n", ""), &names);
+    assert!(said.contains("there is no X0 with a Delta_X"), "{said}");
+}
+
+#[test]
+fn times_that_labview_writes_beside_each_column_are_taken_once() {
+    let (above, _) = LABVIEW.split_once("X_Value").unwrap();
+    let above = above
+        .replace("X_Columns\tOne", "X_Columns\tMulti")
+        .replace("Y_Unit_Label\tMillivolts\tMillivolts\t", "Y_Unit_Label\tMillivolts\t\tMillivolts\t\t")
+        .replace("X0\t0,0E+0\t0,0E+0", "X0\t0,0E+0\t\t0,0E+0\t")
+        .replace("Delta_X\t0,100000\t0,100000", "Delta_X\t0,100000\t\t0,100000\t");
+    let rows = "X_Value\tSin\tX_Value\tCos\tComment\n0,0\t1000,0\t0,0\t0,0\n0,1\t500,0\t0,1\t600,0\n";
+    let names = ["t_s=X_Value", "xc_v=Sin", "yc_v=Cos"];
+    let recording = read(&(above.clone() + rows), &names).unwrap();
+    assert_eq!((recording.t_s.clone(), recording.yc_v.clone()), (vec![0.0, 0.1], Some(vec![0.0, 0.6])));
+    let other = above.replace("X0\t0,0E+0\t\t0,0E+0", "X0\t0,0E+0\t\t5,0E-2");
+    assert!(refusal(&(other + rows), &names).contains("differ from column to column"));
 }
 
 #[test]

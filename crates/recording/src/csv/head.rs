@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::beneath;
 use super::blocks::LONGEST_LINE;
-use super::preamble::{END_OF_PREAMBLE, Preamble};
+use super::preamble::{END_OF_PREAMBLE, Preamble, TIMES};
 use super::record::{Record, Records};
 use crate::channel::Channel;
 use crate::error::ReadError;
@@ -34,6 +34,8 @@ pub(super) struct Head {
     pub(super) read_ahead: Vec<u8>,
     /// Units that the file states for channels.
     pub(super) units: Vec<(Channel, String)>,
+    /// First time and interval, where the file says them above its header and leaves the column of times empty.
+    pub(super) even_times: Option<(f64, f64)>,
     /// What was passed over.
     pub(super) warnings: Vec<String>,
 }
@@ -139,7 +141,12 @@ fn below_a_preamble(
         } else {
             format!("lines {first} to {last}, above the header, are passed over")
         });
-        preamble.tell(&mut head);
+        preamble.tell(&mut head).map_err(|what| ReadError::Header {
+            path: source.to_path_buf(),
+            line: header_line,
+            what,
+            wanted: "one time for all columns, as X_Columns One writes it",
+        })?;
     }
     Ok(head)
 }
@@ -228,7 +235,11 @@ fn understand(
             "names without line breaks, quotes in pairs",
         );
     };
-    let names: Vec<String> = record.fields().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+    let mut names: Vec<String> = record.fields().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+    // LabVIEW may write the times once more beside each column
+    for (number, again) in names.iter_mut().filter(|name| name.trim() == TIMES).enumerate().skip(1) {
+        *again = format!("{TIMES} {}", number + 1);
+    }
     let is_number = |name: &String| name.trim().replace(',', ".").parse::<f64>().is_ok();
     if names.iter().all(is_number) {
         return refuse("the first line holds numbers".to_owned(), "a header line with the column names above them");
@@ -243,5 +254,14 @@ fn understand(
     }
     let layout = Layout::new(&names, naming, source)?;
     let (read_ahead, units, warnings) = (vec![], vec![], vec![]);
-    Ok(Head { layout, separator, header_line: line, next_line: line + 1, read_ahead, units, warnings })
+    Ok(Head {
+        layout,
+        separator,
+        header_line: line,
+        next_line: line + 1,
+        read_ahead,
+        units,
+        even_times: None,
+        warnings,
+    })
 }

@@ -33,7 +33,7 @@ use super::channel::Channel;
 use super::error::ReadError;
 use super::layout::Field;
 use super::naming::Naming;
-use super::table::Table;
+use super::table::{Missing, Table};
 
 /// How much text is taken at a time.
 #[derive(Debug, Clone, Copy)]
@@ -155,7 +155,20 @@ fn read_table(
     }
     let mut table = assembly.finish();
     (table.units, table.warnings) = (head.units.clone(), head.warnings.clone());
+    if let Some(even) = head.even_times {
+        fill_times(&mut table, even);
+    }
     Ok(table)
+}
+
+/// Counts the times of a column that the file leaves empty.
+fn fill_times(table: &mut Table, (first, step): (f64, f64)) {
+    let rows = table.rows as u64;
+    for column in table.numbers.iter_mut().filter(|c| c.channel == Channel::Time && c.missing.count == rows) {
+        column.values.iter_mut().enumerate().for_each(|(row, t)| *t = first + row as f64 * step);
+        column.missing = Missing::default();
+        table.warnings.push(format!("X_Columns is No: `t_s` is counted from {first} in steps of {step}"));
+    }
 }
 
 /// Makes room for the rows of a whole file, told by its first block.

@@ -1,6 +1,7 @@
 //! A Parquet file into a table: numbers of any common type as f64, nulls as missing, unknown columns as text.
 //!
-//! Nested columns and times of day are refused where a number is wanted, and left out with a warning where nothing is.
+//! A time that is a time stamp is counted from the first, in s. Nested columns and times of day are refused where a number is
+//! wanted, and left out with a warning where nothing is.
 
 use std::fs::File;
 use std::path::Path;
@@ -14,6 +15,7 @@ use parquet::schema::types::ColumnDescPtr;
 
 use crate::Recording;
 use crate::admission;
+use crate::channel::Channel;
 use crate::error::{Place, ReadError};
 use crate::layout::{Field, Layout};
 use crate::memory;
@@ -43,7 +45,16 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     for (at, description) in descriptions.columns().iter().enumerate() {
         let name = description.path().parts().first().map_or("", String::as_str);
         let is_channel = naming.channel(name).is_some();
-        match unreadable(description, is_channel) {
+        let is_stamp = naming.channel(name) == Some(Channel::Time) && tick_s(description).is_some();
+        if is_stamp && naming.factor(Channel::Time).is_some_and(|factor| factor != 1.0) {
+            return Err(refuse(format!(
+                "column `{name}` is of time stamps, and the mapping of `t_s` has a factor; wanted none"
+            )));
+        }
+        if is_stamp {
+            warnings.push("times are time stamps: `t_s` is counted from the first, in s".to_owned());
+        }
+        match unreadable(description, is_channel).filter(|_| !is_stamp) {
             None => {
                 kept.push(at);
                 names.push(name);
@@ -63,7 +74,10 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     let columns: Vec<Column> = kept
         .iter()
         .zip(&layout.fields)
-        .map(|(&at, field)| read_column(&reader, at, *field))
+        .map(|(&at, field)| {
+            let is_time = matches!(field, Field::Number(at) if layout.channels[*at] == Channel::Time);
+            read_column(&reader, at, *field, is_time)
+        })
         .collect::<Result<_, ParquetError>>()
         .map_err(|error| refuse(error.to_string()))?;
     table.rows = columns.first().map_or(0, Column::len);
@@ -81,6 +95,24 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
         }
     }
     Ok(table)
+}
+
+/// The unit of a column of time stamps, s.
+fn tick_s(description: &ColumnDescPtr) -> Option<f64> {
+    use parquet::basic::{ConvertedType, TimeUnit, Type};
+    if description.physical_type() != Type::INT64 || description.max_rep_level() > 0 {
+        return None;
+    }
+    match (description.logical_type_ref(), description.converted_type()) {
+        (Some(LogicalType::Timestamp(stamp)), _) => Some(match stamp.unit {
+            TimeUnit::MILLIS => 1e-3,
+            TimeUnit::MICROS => 1e-6,
+            TimeUnit::NANOS => 1e-9,
+        }),
+        (None, ConvertedType::TIMESTAMP_MILLIS) => Some(1e-3),
+        (None, ConvertedType::TIMESTAMP_MICROS) => Some(1e-6),
+        _ => None,
+    }
 }
 
 /// Why a column cannot be read, if it cannot.
@@ -141,7 +173,14 @@ impl Column {
     }
 }
 
-fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> Result<Column, ParquetError> {
+fn read_column(
+    reader: &SerializedFileReader<File>,
+    at: usize,
+    field: Field,
+    is_time: bool,
+) -> Result<Column, ParquetError> {
+    // the first of time stamps: what is left of them has few enough digits for a number
+    let mut first_stamp = None;
     let mut column = match field {
         Field::Number(_) => Column::Numbers(vec![], Missing::default()),
         Field::Text(_) => Column::Texts(Cells::default()),
@@ -150,6 +189,7 @@ fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> 
         let group = reader.get_row_group(group)?;
         let most = column.len() + usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         let description = group.metadata().column(at).column_descr_ptr();
+        let tick = tick_s(&description);
         let is_unsigned = matches!(description.logical_type_ref(), Some(LogicalType::Integer(kind)) if !kind.is_signed);
         // Unsigned integers are stored in the bits of signed ones.
         match group.get_column_reader(at)? {
@@ -163,6 +203,11 @@ fn read_column(reader: &SerializedFileReader<File>, at: usize, field: Field) -> 
                 add_integer(&mut column, value.map(i128::from));
             })?,
             ColumnReader::Int64ColumnReader(values) => each(values, &description, |v| {
+                if let Some(tick) = tick.filter(|_| is_time) {
+                    let mut from = |v: i64| i128::from(v) - i128::from(*first_stamp.get_or_insert(v));
+                    column.push_number(v.map(|&v| from(v) as f64 * tick));
+                    return;
+                }
                 let value = v.map(|&v| if is_unsigned { i128::from(v.cast_unsigned()) } else { i128::from(v) });
                 add_integer(&mut column, value);
             })?,
