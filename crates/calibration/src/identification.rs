@@ -12,6 +12,7 @@ use crate::diagnostics::residual::{
     Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
 };
 use crate::diagnostics::scale_factor::{gains, scale_factor};
+use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
@@ -30,7 +31,8 @@ use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{described, unexplained};
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, ScaleFactor, Status, Tool,
+    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, ScaleFactor, Status,
+    Temperature, Tool,
 };
 use crate::selection::discovery::{Step, discover};
 use crate::selection::last_step::last_step;
@@ -92,6 +94,8 @@ pub struct BiasCurve {
 
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
+/// A run whose mean rate is more than this share of its mean speed turns one way.
+pub(crate) const ONE_WAY: f64 = 0.9;
 /// Identifies the instrument of a campaign.
 ///
 /// # Errors
@@ -239,7 +243,11 @@ impl Found {
         let effects = inference.effects(&self.steps, &errors.discovered);
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain();
-        let plots = with_plots.then(|| self.plots(&inference));
+        let plots = with_plots.then(|| {
+            let members = &fitted.fit.hypothesis.members;
+            let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
+            self.context(&told).plots()
+        });
         let left = unexplained(dataset, &errors.on_fit, &errors.dense_on_fit, &errors.discovered, errors.noise_floor);
         let proposals = proposals(dataset, &fitted.fit, &errors.on_fit, &channels_left, &left);
         let mut unexplained = described(&fitted.fit.hypothesis, &self.steps);
@@ -252,7 +260,8 @@ impl Found {
             held_out: errors.discovered.errors().count(),
             fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
         };
-        let runs = self.runs(head.runs, &mut warnings);
+        let mut runs = self.runs(head.runs, &mut warnings);
+        let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some());
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
             schema: SCHEMA.into(),
@@ -276,11 +285,16 @@ impl Found {
             proposals,
             scale_factor: self.scale_factor,
             allan: None,
+            temperature,
             decay: None,
             warnings,
         };
-        let provenance =
-            Provenance { tool: Some(Tool::default()), inputs: report.inputs.clone(), amplitude_v: head.amplitude_v };
+        let provenance = Provenance {
+            tool: Some(Tool::default()),
+            inputs: report.inputs.clone(),
+            amplitude_v: head.amplitude_v,
+            readout_unit: None,
+        };
         let hypothesis = self.fitted.fit.hypothesis.clone();
         let mut calibration = Calibration { device: report.device.clone(), hypothesis, provenance };
         gate::pass(&report, &calibration, facts)?;
@@ -294,9 +308,7 @@ impl Found {
         Ok(Identification { report, figures, calibration, steps, plots })
     }
 
-    fn plots(&self, inference: &Inference<'_>) -> PlotData {
-        let members = &self.fitted.fit.hypothesis.members;
-        let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
+    fn context<'a>(&'a self, members: &'a [usize]) -> PlotContext<'a> {
         PlotContext {
             dataset: &self.dataset,
             fit: &self.fitted.fit,
@@ -305,9 +317,27 @@ impl Found {
             declared: &self.errors.declared,
             discovered: &self.errors.discovered,
             on_fit: &self.errors.on_fit,
-            members: &told,
+            members,
         }
-        .plots()
+    }
+
+    /// How what the runs tell goes with their temperatures.
+    fn temperature(&self, runs: &mut [RunReport], tells_ratio: bool) -> Option<Temperature> {
+        if runs.iter().filter(|r| r.temp_c.is_some()).count() < 2 {
+            return None;
+        }
+        let ratios =
+            if tells_ratio { self.context(&[]).own_detection_ratios() } else { vec![None; self.dataset.tracks.len()] };
+        let told = self.dataset.screen.of(runs).into_iter().zip(&self.dataset.tracks).zip(ratios);
+        let seen: Vec<Seen> = told
+            .filter_map(|((run, t), ratio)| {
+                run.detection_gain_ratio = ratio.filter(|_| run.temp_c.is_some());
+                let (rate, speed) = (t.track.mean_rate(), t.track.mean_speed());
+                let steady = (rate.abs() > ONE_WAY * speed).then_some(rate.to_degrees());
+                Some(Seen::of(run, steady, run.temp_c?))
+            })
+            .collect();
+        temperature(&seen, self.fitted.fit.hypothesis.sense())
     }
 
     /// What each run tells by itself, and how it was used.
@@ -407,8 +437,16 @@ pub(crate) fn run_report(run: &crate::recording::Run) -> RunReport {
         angular_gain: None,
         bias_dps: None,
         rms_deg: None,
+        temp_c: run.recording.temp_c.as_deref().and_then(mean_finite),
+        detection_gain_ratio: None,
         agrees: None,
     }
+}
+
+/// Mean of what is finite.
+fn mean_finite(values: &[f64]) -> Option<f64> {
+    let (sum, count) = values.iter().filter(|v| v.is_finite()).fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// Rows that a recording had before it was demodulated.

@@ -4,6 +4,7 @@
 use crate::angle_sensor::likeness;
 use crate::angle_sensor::reference_free::{self, Curve};
 use crate::diagnostics::at_rest;
+use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::identification::{Identification, Options, identify_with_plots, run_report};
 use crate::recording::{Campaign, Run};
@@ -85,7 +86,9 @@ fn survey(
 ) -> Result<Answer, Refusal> {
     let instrument = campaign.instrument.name();
     let runs = campaign.runs.iter().map(run_report).collect();
+    let ratios = reference_free::own_ratios(&campaign);
     let mut report = Survey::new(campaign.device.clone(), instrument, inputs, runs);
+    report.runs.iter_mut().zip(ratios).for_each(|(run, ratio)| run.detection_gain_ratio = ratio);
     report.warnings = campaign.all_warnings().map(str::to_owned).collect();
     let (mut calibration, mut curve) = (None, None);
     if !campaign.runs.is_empty() {
@@ -102,5 +105,7 @@ fn survey(
         report.warnings.extend(rest.warnings);
         report.allan = Some(rest.allan);
     }
+    let seen: Vec<Seen> = report.runs.iter().filter_map(|r| Some(Seen::of(r, None, r.temp_c?))).collect();
+    report.temperature = temperature(&seen, 1.0);
     Ok(Answer::Surveyed(Box::new(Surveyed { report, calibration, curve })))
 }

@@ -36,6 +36,11 @@ pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {
     from_second_moments([mean[0] + size * centre.x, mean[1] + size * centre.y], size, &second)
 }
 
+/// Gain of Y over X by the ellipse of one run.
+pub(crate) fn gain_ratio(run: &SensorRun) -> Option<f64> {
+    algebraic(std::slice::from_ref(run)).map(|readout| readout.p[2].exp())
+}
+
 /// The channels regressed on cosine and sine of the reference in the run that turns the furthest.
 pub(crate) fn by_reference(runs: &[SensorRun], harmonic_gain: f64) -> Option<Readout> {
     let turned = |r: &SensorRun| r.travel_rad() * harmonic_gain.abs();

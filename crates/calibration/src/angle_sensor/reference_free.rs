@@ -75,6 +75,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         tool: Some(Tool::default()),
         inputs: provenance::sums(&provenance::files(&campaign)),
         amplitude_v: provenance::amplitudes(&campaign),
+        readout_unit: provenance::readout_unit(&campaign),
     };
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
@@ -111,13 +112,15 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         hypothesis.members.sort_by_key(|m| m.id);
         hypothesis.clip = clip(&readout);
     }
+    let mut effects = if neutral { Vec::new() } else { readout_effects(&readout, deviations, &evidence) };
+    provenance::in_unit(&mut effects, provenance.readout_unit.as_deref());
     let calibration = Calibration { device, hypothesis, provenance };
     calibration_stands(&calibration)?;
     Ok(Told {
         status: if neutral { Status::Neutral } else { Status::Answered },
         reason: neutral.then(|| "nothing that was found makes the radius of held-out rows more constant".to_owned()),
         detection_gain_ratio: told.then(|| Estimate { value: values[2], ci95: [values[2] - half, values[2] + half] }),
-        effects: if neutral { Vec::new() } else { readout_effects(&readout, deviations, &evidence) },
+        effects,
         radius: Radius {
             before,
             after,
@@ -142,6 +145,15 @@ pub(crate) fn full_turn_gain(run: &Run) -> Option<f64> {
     }
     let followed = unwrapped(channels.iter().map(|z| centre.angle(*z)), TAU);
     Some(line(&run.reference_rad, &followed).0)
+}
+
+/// The gain of Y over X by the ellipse of each run, beside a temperature.
+pub(crate) fn own_ratios(campaign: &Campaign) -> Vec<Option<f64>> {
+    let own = |(number, run): (usize, &Run)| {
+        let run = run.recording.temp_c.as_ref().map(|_| run.clone())?;
+        ellipse::gain_ratio(&SensorRun::without_reference(run, number).ok()?)
+    };
+    campaign.runs.iter().enumerate().map(own).collect()
 }
 
 fn refuse(what: String, wanted: &str) -> Refusal {

@@ -5,21 +5,23 @@ use super::samples::SensorRun;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
+    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, inflation, ljung_box, reported_harmonics,
 };
+use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::residuals::Residual;
 use crate::estimation::statistics::median;
-use crate::identification::{BiasCurve, Figures, Identification, run_report};
+use crate::identification::{BiasCurve, Figures, Identification, ONE_WAY, run_report};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::{Campaign, Instrument};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
+use crate::report::runs::Slope;
 use crate::report::stages::stages;
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, Share, Status, StepReport, Tool,
-    Unexplained,
+    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, Share, Status, StepReport,
+    Temperature, Tool, Unexplained,
 };
 
 /// Errors of a run at one stage, rad.
@@ -56,6 +58,7 @@ pub(crate) struct Head {
     runs: Vec<RunReport>,
     inputs: Vec<Input>,
     amplitude_v: Option<[f64; 2]>,
+    readout_unit: Option<String>,
     warnings: Vec<String>,
 }
 
@@ -66,6 +69,7 @@ impl Head {
             runs: campaign.runs.iter().map(run_report).collect(),
             inputs: provenance::sums(&provenance::files(campaign)),
             amplitude_v: provenance::amplitudes(campaign),
+            readout_unit: provenance::readout_unit(campaign),
             warnings: campaign.runs.iter().flat_map(|r| r.recording.warnings.iter().cloned()).collect(),
         }
     }
@@ -119,6 +123,7 @@ pub(crate) fn report(
     let white = ljung_box(&correlation, on_fit.errors().count()) >= WHITENESS_LEVEL;
     let floor = noise_floor(&after, held);
     let mut effects = if neutral { Vec::new() } else { finding.effects.clone() };
+    provenance::in_unit(&mut effects, head.readout_unit.as_deref());
     for e in effects.iter_mut().filter(|e| e.origin != Origin::Declared) {
         e.heldout_rms_deg =
             Some(crate::report::BeforeAfter { before: declared.size().rms_deg, after: after.size().rms_deg });
@@ -134,6 +139,7 @@ pub(crate) fn report(
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, &after)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
     let plots = with_plots.then(|| plots(&names, raw.as_ref(), &declared, &after, &finding));
+    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&on_fit, &after]);
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -162,18 +168,24 @@ pub(crate) fn report(
             white,
         },
         channels: Vec::new(),
-        runs: runs(&head, fitted, held, &on_fit, &after),
+        runs: reported,
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
         scale_factor: None,
         allan: None,
+        temperature,
         decay: None,
         warnings,
     };
     let figures =
         Figures { bias: curves(held, raw.as_ref(), &declared, &after, finding.period), ring_downs: Vec::new() };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
-    let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: head.amplitude_v };
+    let provenance = Provenance {
+        tool: Some(Tool::default()),
+        inputs: head.inputs,
+        amplitude_v: head.amplitude_v,
+        readout_unit: head.readout_unit,
+    };
     let calibration = Calibration { device: head.device, hypothesis, provenance };
     if !neutral {
         let facts = Facts {
@@ -296,31 +308,63 @@ fn described(effects: &[EffectReport]) -> Vec<Unexplained> {
     out
 }
 
+/// What each run tells, and how that goes with the temperature.
 fn runs(
     head: &Head,
-    fitted: &[SensorRun],
-    held: &[SensorRun],
-    on_fit: &Evaluation,
-    after: &Evaluation,
-) -> Vec<RunReport> {
+    finding: &Finding<'_>,
+    [fitted, held]: [&[SensorRun]; 2],
+    [on_fit, after]: [&Evaluation; 2],
+) -> (Vec<RunReport>, Option<Temperature>) {
     let mut out = head.runs.clone();
+    let mut steady = vec![None; out.len()];
+    let memory = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
     let both = fitted.iter().zip(&on_fit.segments).zip(&on_fit.kept).map(|x| (x, true));
     for (((run, s), kept), is_fit) in both.chain(held.iter().zip(&after.segments).zip(&after.kept).map(|x| (x, false)))
     {
         let Some(r) = out.get_mut(run.number) else { continue };
         let n = run.len() - 1;
-        r.rate_dps = Some(((run.reference_rad[n] - run.reference_rad[0]) / (run.t_s[n] - run.t_s[0])).to_degrees());
+        let rate = ((run.reference_rad[n] - run.reference_rad[0]) / (run.t_s[n] - run.t_s[0])).to_degrees();
+        r.rate_dps = Some(rate);
         r.spikes += kept.iter().filter(|k| !**k).count();
         let own = Evaluation { segments: vec![s.clone()], kept: vec![kept.clone()] };
         r.rms_deg = Some(own.size().rms_deg);
         let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
+        if is_fit || !shared {
+            tell(r, run, finding, (s, kept), memory);
+            let speed = run.rate_rad_s.iter().map(|w| w.abs()).sum::<f64>() / run.len() as f64;
+            steady[run.number] = Some(rate).filter(|r| r.abs() > ONE_WAY * speed.to_degrees());
+        }
         r.r#use = match (shared, is_fit) {
             (true, _) => "fit, last quarter held out".into(),
             (false, true) => "fit".into(),
             (false, false) => "holdout".into(),
         };
     }
-    out
+    let seen: Vec<Seen> =
+        out.iter().zip(steady).filter_map(|(r, steady)| Some(Seen::of(r, steady, r.temp_c?))).collect();
+    let temperature = temperature(&seen, finding.hypothesis.sense());
+    (out, temperature)
+}
+
+/// Gain and bias of a rate gyroscope as one run alone tells them; the gain ratio of channels beside a temperature.
+fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, (s, kept): (&Residual, &[bool]), memory: f64) {
+    if r.temp_c.is_some() && run.channels().is_some() {
+        r.detection_gain_ratio = super::ellipse::gain_ratio(run);
+    }
+    if finding.instrument != Instrument::Gyroscope || finding.reason.is_some() {
+        return;
+    }
+    let (mut of_input, mut of_time) = (Slope::default(), Slope::default());
+    of_input.add(&s.turned, &s.angle, kept);
+    of_time.add(&s.t_s, &s.angle, kept);
+    if let (Some([slope, deviation, _]), Some([drift, drift_deviation, _])) =
+        (of_input.told(memory), of_time.told(memory))
+    {
+        let gain = finding.hypothesis.angular_gain + finding.hypothesis.sense() * slope;
+        r.angular_gain = Some(Estimate::new(gain, deviation));
+        let bias = finding.hypothesis.rate_bias_rad_s + drift;
+        r.bias_dps = Some(Estimate::new(bias.to_degrees(), drift_deviation.to_degrees()));
+    }
 }
 
 fn curves(

@@ -8,3 +8,4 @@ pub(crate) mod influences;
 pub mod plots;
 pub(crate) mod residual;
 pub(crate) mod scale_factor;
+pub(crate) mod temperature;

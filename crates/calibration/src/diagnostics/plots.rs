@@ -356,10 +356,24 @@ impl PlotContext<'_> {
         })
     }
 
-    /// How large a member is in each run: the errors without it, set against the share that the joint fit gives it.
-    fn sizes(&self, at: usize) -> EffectSizes {
+    /// The ratio of the detection gains as each track alone tells it, where it is a member: what the run says of the member's
+    /// share in the angle, which grows as the ratio less one.
+    pub(crate) fn own_detection_ratios(&self) -> Vec<Option<f64>> {
+        let members = &self.hypothesis().members;
+        let Some(at) = members.iter().position(|m| m.id == EffectId::DetectionGainMismatch) else {
+            return vec![None; self.dataset.tracks.len()];
+        };
+        let told = |s: &Share| {
+            let ratio = 1.0 + (members[at].values[0] - 1.0) * (1.0 + s.ed / s.dd);
+            (s.count > 0.0 && s.dd > 0.0 && ratio.is_finite()).then_some(ratio)
+        };
+        self.shares(at).iter().map(told).collect()
+    }
+
+    /// What each track says of a member: the errors without it, set against the share that the joint fit gives it.
+    fn shares(&self, at: usize) -> Vec<Share> {
         let mut without = self.hypothesis().clone();
-        let id = without.members.remove(at).id;
+        without.members.remove(at);
         let mut shares = vec![Share::default(); self.dataset.tracks.len()];
         for (role, with) in [(Role::Fit, self.on_fit), (Role::Holdout, self.discovered)] {
             for ((s, bare), kept) in with.segments.iter().zip(self.errors_of(&without, role, with)).zip(&with.kept) {
@@ -368,6 +382,13 @@ impl PlotContext<'_> {
                 }
             }
         }
+        shares
+    }
+
+    /// How large a member is in each run.
+    fn sizes(&self, at: usize) -> EffectSizes {
+        let id = self.hypothesis().members[at].id;
+        let shares = self.shares(at);
         let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         let runs = shares.iter().enumerate().filter(|(_, s)| s.count > 0.0 && s.dd > 0.0).map(|(number, s)| {
             let track = &self.dataset.tracks[number].track;

@@ -127,11 +127,12 @@ pub(crate) fn report(
         proposals: Vec::new(),
         scale_factor: None,
         allan: None,
+        temperature: None,
         decay: Some(decay(finding, fitted, &head)),
         warnings,
     };
     let figures = Figures { bias: curves(&names, raw_errors, declared, found), ring_downs: Vec::new() };
-    let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, amplitude_v: None };
+    let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, ..Provenance::default() };
     let mut calibration = Calibration { device: head.device, hypothesis, provenance };
     let facts = Facts {
         instrument: Instrument::Gyroscope,

@@ -52,6 +52,8 @@ pub struct Provenance {
     pub inputs: Vec<Input>,
     /// smallest and largest amplitude of the readout, in its unit, as the medians of runs; none where only an angle was read
     pub amplitude_v: Option<[f64; 2]>,
+    /// unit of the readout, where it is not V: what is said in V is in it
+    pub readout_unit: Option<String>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -69,6 +71,8 @@ struct File {
     rate_bias_rad_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     amplitude_v: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    readout_unit: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     temperature_c: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -134,6 +138,7 @@ impl Calibration {
                 .collect(),
             rate_bias_rad_s: h.rate_bias_rad_s,
             amplitude_v: self.provenance.amplitude_v,
+            readout_unit: self.provenance.readout_unit.clone(),
             temperature_c: h.reference_c,
             tool: self.provenance.tool.clone(),
             input: self.provenance.inputs.clone(),
@@ -198,7 +203,12 @@ impl Calibration {
         hypothesis.clip = file.clip;
         hypothesis.reference_c = file.temperature_c;
         hypothesis.rate_bias_rad_s = file.rate_bias_rad_s;
-        let provenance = Provenance { tool: file.tool, inputs: file.input, amplitude_v: file.amplitude_v };
+        let provenance = Provenance {
+            tool: file.tool,
+            inputs: file.input,
+            amplitude_v: file.amplitude_v,
+            readout_unit: file.readout_unit,
+        };
         Ok(Self { device: file.device, hypothesis, provenance })
     }
 

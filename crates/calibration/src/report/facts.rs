@@ -301,6 +301,12 @@ pub struct RunReport {
     pub bias_dps: Option<Estimate>,
     /// angle error of this run less its best line, deg rms
     pub rms_deg: Option<f64>,
+    /// mean temperature, °C; null where none was recorded
+    #[serde(default)]
+    pub temp_c: Option<f64>,
+    /// G_Dy/G_Dx as this run alone tells it; only beside a temperature, and null where it does not
+    #[serde(default)]
+    pub detection_gain_ratio: Option<f64>,
     /// it agrees with the other runs; false where it was left out because it does not, null where it was not judged
     pub agrees: Option<bool>,
 }
@@ -338,6 +344,23 @@ pub struct ScaleFactor {
     pub nonlinearity_ppm: Estimate,
     /// angular gain at positive less that at negative rates, over their mean, ppm
     pub asymmetry_ppm: Estimate,
+}
+
+/// How what runs tell goes with their temperatures: slopes of straight lines, with intervals from the scatter of the runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Temperature {
+    /// runs with a temperature
+    pub runs: usize,
+    /// lowest and highest mean temperature of a run, °C
+    pub range_c: [f64; 2],
+    /// of the angular gain, 1/K
+    pub angular_gain_per_k: Option<Estimate>,
+    /// of the bias, deg/s/K
+    pub bias_dps_per_k: Option<Estimate>,
+    /// of G_Dy/G_Dx, 1/K
+    pub detection_gain_ratio_per_k: Option<Estimate>,
+    /// why a slope that is null is not told
+    pub reason: Option<String>,
 }
 
 /// What decays without any loop tell of a resonator.
@@ -421,6 +444,9 @@ pub struct Report {
     pub scale_factor: Option<ScaleFactor>,
     /// how far the angle wanders at rest; null without a run at rest
     pub allan: Option<Allan>,
+    /// how gain, bias and readout go with the temperature; null without two runs with one
+    #[serde(default)]
+    pub temperature: Option<Temperature>,
     /// what free decays tell; absent without them
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decay: Option<DecayReport>,

@@ -5,8 +5,8 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::estimation::statistics::median;
-use crate::recording::{Campaign, Recording, RunKind};
-use crate::report::Input;
+use crate::recording::{Campaign, Instrument, Recording, RunKind};
+use crate::report::{EffectReport, Input};
 
 /// Bytes that are read at once.
 const PIECE: usize = 1 << 16;
@@ -59,6 +59,31 @@ pub(crate) fn amplitude(recording: &Recording) -> Option<f64> {
     let rows = (0..x.len()).step_by(stride);
     let of = |i: usize| x[i].hypot(y[i]).hypot(part(&recording.xs_v, i).hypot(part(&recording.ys_v, i)));
     Some(median(&mut rows.map(of).collect::<Vec<_>>()))
+}
+
+/// A readout of whole numbers up to this and more is of a converter's counts.
+const COUNTS: f64 = 64.0;
+
+/// The unit of a sensor's channels, where it is not of volts: what its files state, or counts, where every reading is a whole
+/// number.
+pub(crate) fn readout_unit(campaign: &Campaign) -> Option<String> {
+    if campaign.instrument != Instrument::Sensor {
+        return None;
+    }
+    let stated = campaign.runs.first()?.recording.readout_unit.clone();
+    stated.or_else(|| {
+        let channels = || campaign.runs.iter().flat_map(|r| [&r.recording.xc_v, &r.recording.yc_v]).flatten().flatten();
+        let largest = channels().fold(0.0f64, |l, v| l.max(v.abs()));
+        (largest >= COUNTS && channels().all(|v| v.fract() == 0.0)).then(|| "counts".to_owned())
+    })
+}
+
+/// Says the parameters of effects in the unit of the channels.
+pub(crate) fn in_unit(effects: &mut [EffectReport], unit: Option<&str>) {
+    let Some(unit) = unit else { return };
+    for p in effects.iter_mut().flat_map(|e| &mut e.parameters) {
+        p.unit = p.unit.replace('V', unit);
+    }
 }
 
 /// A file as the campaign names it, so that a report does not depend on where the campaign lies.

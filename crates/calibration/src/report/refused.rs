@@ -41,6 +41,7 @@ pub struct Refused {
     proposals: [(); 0],
     scale_factor: Option<()>,
     allan: Option<()>,
+    temperature: Option<()>,
     warnings: [String; 0],
 }
 
@@ -81,6 +82,7 @@ impl About {
             proposals: [],
             scale_factor: None,
             allan: None,
+            temperature: None,
             warnings: [],
         }
     }

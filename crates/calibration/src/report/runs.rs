@@ -11,7 +11,7 @@ use crate::report::{Estimate, RunReport};
 
 /// A slope and its standard deviation, from sums over segments that have a level each.
 #[derive(Debug, Clone, Copy, Default)]
-struct Slope {
+pub(crate) struct Slope {
     xx: f64,
     xy: f64,
     yy: f64,
@@ -20,7 +20,7 @@ struct Slope {
 }
 
 impl Slope {
-    fn add(&mut self, x: &[f64], y: &[f64], kept: &[bool]) {
+    pub(crate) fn add(&mut self, x: &[f64], y: &[f64], kept: &[bool]) {
         let kept = || x.iter().zip(y).zip(kept).filter(|(_, k)| **k).map(|(p, _)| p);
         let n = kept().count() as f64;
         if n < 3.0 {
@@ -38,7 +38,7 @@ impl Slope {
     }
 
     /// Value, standard deviation where the error's memory multiplies variances by `memory`, and rms of what is left.
-    fn told(&self, memory: f64) -> Option<[f64; 3]> {
+    pub(crate) fn told(&self, memory: f64) -> Option<[f64; 3]> {
         let value = self.xy / self.xx;
         let left = (self.yy - value * self.xy).max(0.0) / (self.count - 2.0).max(1.0);
         let told = [value, (memory * left / self.xx).sqrt(), left.sqrt()];

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use crate::report::{Allan, EffectReport, Estimate, Input, RunReport, SCHEMA, Status, Tool, Unexplained};
+use crate::report::{Allan, EffectReport, Estimate, Input, RunReport, SCHEMA, Status, Temperature, Tool, Unexplained};
 
 /// How constant a radius is that a sensor holds, as shares of its mean, on rows that nothing was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -78,6 +78,8 @@ pub struct Survey {
     scale_factor: Option<()>,
     /// how far the angle wanders at rest; null without a run at rest
     pub allan: Option<Allan>,
+    /// how bias and readout go with the temperature; null without two runs with one
+    pub temperature: Option<Temperature>,
     /// what a reader must know
     pub warnings: Vec<String>,
 }
@@ -108,6 +110,7 @@ impl Survey {
             proposals: [],
             scale_factor: None,
             allan: None,
+            temperature: None,
             warnings: Vec::new(),
         }
     }
