@@ -63,6 +63,11 @@ Examples:
   cvg compare monday/report.json friday/report.json --json
   cvg compare a/calibration.toml b/calibration.toml values alone: a calibration has no intervals";
 
+const FIRMWARE: &str = "\
+Examples:
+  cvg firmware results/calibration.toml --out cvg_correction.h      float cvg_compensate(float x, float y)
+  cvg firmware results/calibration.toml --out table.csv --points 64";
+
 const EFFECTS: &str = "\
 Examples:
   cvg effects                                       one line for each
@@ -229,6 +234,18 @@ pub(crate) enum Command {
         device: Option<String>,
         #[command(flatten)]
         mapping: Mapping,
+    },
+    /// Write the correction of a two-channel sensor for a controller: a C header with cvg_compensate(x, y), or a table
+    #[command(after_help = FIRMWARE)]
+    Firmware {
+        /// calibration.toml from `cvg identify`
+        calibration: PathBuf,
+        /// C header (.h), or a table of the angle alone at the calibrated amplitude (.csv)
+        #[arg(long)]
+        out: PathBuf,
+        /// Points of a table over a period
+        #[arg(long, default_value_t = 256)]
+        points: usize,
     },
     /// The library of effects: what a recording can hold
     #[command(after_help = EFFECTS)]

@@ -12,6 +12,7 @@ mod compensate;
 mod demo;
 mod failure;
 mod figure;
+mod firmware;
 mod fleet;
 mod input;
 mod inspect;
@@ -97,6 +98,7 @@ fn done(command: Command) -> Result<(), Failure> {
         Command::Compensate { calibration, recordings, out, device, mapping } => {
             compensate::compensate(&calibration, &recordings, &out, device.as_deref(), &mapping.naming()?)
         }
+        Command::Firmware { calibration, out, points } => firmware::firmware(&calibration, &out, points),
         Command::Effects { export: Some(id), .. } => library::export(&id),
         Command::Effects { effect, json, markdown, .. } => library::effects(effect.as_deref(), json, markdown),
         Command::Paper { out } => paper::paper(&out),

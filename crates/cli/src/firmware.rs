@@ -1,0 +1,337 @@
+//! `cvg firmware`: the correction of a two-channel sensor for a controller without the crates: a C header with
+//! `cvg_compensate(x, y)`, or a table of the angle alone.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::calibration::Calibration;
+use cvg_calibration::recording::Instrument;
+use cvg_calibration::{ChannelClip, Hypothesis};
+use cvg_model::Envelope;
+use cvg_model::effects::{EffectId, Moment, Stage, Values};
+
+use crate::{Failure, output};
+
+/// Points of a period at which a table is checked, for each of its own.
+const CHECKED: usize = 16;
+/// Halvings of the search for a radius.
+const HALVINGS: usize = 80;
+/// A radius is looked for up to so many calibrated amplitudes.
+const FURTHEST: f64 = 8.0;
+
+/// Writes the header, or the table where the name ends in `.csv`.
+pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: usize) -> Result<(), Failure> {
+    let inputs: [PathBuf; 1] = [calibration_file.to_owned()];
+    output::check_file(out, &inputs)?;
+    if !(8..=65_536).contains(&points) {
+        return Err(Failure::input(format!("--points {points}: wanted 8 to 65536")));
+    }
+    let calibration = Calibration::read(calibration_file)?;
+    let h = &calibration.hypothesis;
+    if h.instrument != Instrument::Sensor {
+        return Err(Failure::input(format!(
+            "{}: the calibration of a gyroscope, whose angle takes four components and the loops; in C that is cvg.h, in Rust \
+             `cvg_estimator::Compensation` (chapter Firmware and C)",
+            calibration_file.display()
+        )));
+    }
+    let steps = steps(h)?;
+    let left_out: Vec<&str> =
+        h.members.iter().filter(|m| step_of(m.id) == Kind::LeftOut).map(|m| m.id.description().id).collect();
+    if !left_out.is_empty() {
+        output::tell(format_args!(
+            "not in it: {}, which two readings alone do not tell: it follows the table, the clock, the rate or the temperature",
+            left_out.join(", ")
+        ));
+    }
+    let table = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    let text = if table { lookup(&calibration, points)? } else { header(&calibration, &steps, &left_out, points) };
+    output::write(out, text.as_bytes(), &inputs)?;
+    output::tell(format_args!("wrote {}", out.display()));
+    Ok(())
+}
+
+#[derive(Debug, PartialEq)]
+enum Kind {
+    Affine,
+    Cubic,
+    LeftOut,
+    Refused,
+}
+
+fn step_of(id: EffectId) -> Kind {
+    match id {
+        EffectId::DetectionOffset | EffectId::DetectionGainMismatch | EffectId::DetectionSkew => Kind::Affine,
+        EffectId::DetectionCubic => Kind::Cubic,
+        _ if id.description().stage != Stage::Readout || id.acts_on_angle() || id.in_time() || id.by_temperature() => {
+            Kind::LeftOut
+        }
+        _ => Kind::Refused,
+    }
+}
+
+/// One step from readings to the vibration or the field behind them.
+enum Step {
+    /// x' = a x + b y + c, y' = d x + e y + f
+    Affine([f64; 6]),
+    /// ¾κ of x and of y
+    Cubic([f64; 2]),
+}
+
+fn moment() -> Moment<f64> {
+    Moment::default()
+}
+
+/// The readout's effects undone, last first; what is linear one after the other is one matrix.
+fn steps(h: &Hypothesis) -> Result<Vec<Step>, Failure> {
+    let mut out: Vec<Step> = Vec::new();
+    for m in h.members.iter().rev() {
+        match step_of(m.id) {
+            Kind::LeftOut => {}
+            Kind::Refused => {
+                let id = m.id.description().id;
+                return Err(Failure::input(format!(
+                    "{id}: has no form in this header; wanted offset, gain, skew and cubic"
+                )));
+            }
+            Kind::Cubic => {
+                let (mean, half) = (m.values[0], m.values[1]);
+                out.push(Step::Cubic([0.75 * (mean + half), 0.75 * (mean - half)]));
+            }
+            Kind::Affine => {
+                let next = matrix(m.id, &m.values);
+                match out.last_mut() {
+                    Some(Step::Affine(before)) => *before = after(next, *before),
+                    _ => out.push(Step::Affine(next)),
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// What an affine effect does, from where it takes three points.
+fn matrix(id: EffectId, values: &Values<f64>) -> [f64; 6] {
+    let at = |x: f64, y: f64| {
+        let z = id.unread(values, Envelope::new(x, 0.0, y, 0.0), &moment());
+        [z.x_c, z.y_c]
+    };
+    let (o, x, y) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
+    [x[0] - o[0], y[0] - o[0], o[0], x[1] - o[1], y[1] - o[1], o[1]]
+}
+
+/// One affine map after another.
+fn after(n: [f64; 6], b: [f64; 6]) -> [f64; 6] {
+    [
+        n[0] * b[0] + n[1] * b[3],
+        n[0] * b[1] + n[1] * b[4],
+        n[0] * b[2] + n[1] * b[5] + n[2],
+        n[3] * b[0] + n[4] * b[3],
+        n[3] * b[1] + n[4] * b[4],
+        n[3] * b[2] + n[4] * b[5] + n[5],
+    ]
+}
+
+/// A number as C reads it in single precision, with all the digits that has.
+fn float(value: f64) -> String {
+    format!("{value:.9e}f")
+}
+
+fn header(calibration: &Calibration, steps: &[Step], left_out: &[&str], points: usize) -> String {
+    let h = &calibration.hypothesis;
+    let mut s = String::new();
+    let mut line = |text: &str| {
+        let _ = writeln!(s, "{text}");
+    };
+    let device = output::plain(&calibration.device).replace("*/", "* /");
+    line(&format!(
+        "/* Correction of the sensor {device}, written by cvg {}. C99; needs atan2f and fmodf.",
+        env!("CARGO_PKG_VERSION")
+    ));
+    line(" *");
+    line(" *     float angle_deg = cvg_compensate(x, y);");
+    line(" *");
+    line(
+        " * x and y are the readings of the two channels in the unit in which they were calibrated; the angle is the sensor's own,",
+    );
+    line(&format!(
+        " * from 0 up to {:.0} degrees, {} periods a turn of the reference. Nothing is kept between calls.",
+        h.period_rad.to_degrees(),
+        h.angular_gain
+    ));
+    if let Some([low, high]) = calibration.provenance.amplitude_v {
+        line(&format!(" * Calibrated at amplitudes from {low:.6} to {high:.6}; beyond them it is extrapolated."));
+    }
+    if !left_out.is_empty() {
+        line(&format!(" * Not in it, since two readings do not tell it: {}.", left_out.join(", ")));
+    }
+    for i in &calibration.provenance.inputs {
+        let file = output::plain(&i.file).replace("*/", "* /");
+        line(&format!(" * From {file}, CRC-32 {}.", i.crc32.as_deref().unwrap_or("unknown")));
+    }
+    line(" */\n#ifndef CVG_CORRECTION_H\n#define CVG_CORRECTION_H\n#include <math.h>\n");
+    if steps.iter().any(|step| matches!(step, Step::Cubic(_))) {
+        line(ROOT);
+    }
+    let table = angle_table(h, points);
+    if let Some((table, worst)) = &table {
+        line(&format!(
+            "/* Degrees to add, at {} even angles of a period; straight lines between them are within {worst:.1e} degrees. */",
+            table.len()
+        ));
+        line(&format!("static const float cvg_table[{}] = {{", table.len() + 1));
+        let closed: Vec<f64> = table.iter().chain(table.first()).copied().collect();
+        for row in closed.chunks(6) {
+            line(&format!("    {},", row.iter().map(|v| float(*v)).collect::<Vec<_>>().join(", ")));
+        }
+        line("};\n");
+    }
+    line("static inline float cvg_compensate(float x, float y)\n{");
+    body(&mut line, h, steps, table.as_ref().map(|(t, _)| t.len()));
+    line("}\n\n#endif");
+    s
+}
+
+/// The root u of k u³ + u = 1.
+const ROOT: &str = "\
+static inline float cvg_root(float k)
+{
+    float u = (1.0f + 2.0f * k) / (1.0f + 3.0f * k);
+    for (int i = 0; i < 2; i++) {
+        const float slope = 3.0f * k * u * u + 1.0f, rest = k * u * u * u + u - 1.0f;
+        u -= rest * slope / (slope * slope - 3.0f * k * u * rest);
+    }
+    return u;
+}
+";
+
+fn body(line: &mut dyn FnMut(&str), h: &Hypothesis, steps: &[Step], points: Option<usize>) {
+    if h.clip.is_some() {
+        line("    const float x_read = x, y_read = y;");
+    }
+    for step in steps {
+        match step {
+            Step::Affine([a, b, c, d, e, f]) => {
+                let [a, b, c, d, e, f] = [a, b, c, d, e, f].map(|v| float(*v));
+                line(&format!("    {{\n        const float u = {a} * x + {b} * y + {c};"));
+                line(&format!("        y = {d} * x + {e} * y + {f};\n        x = u;\n    }}"));
+            }
+            Step::Cubic([k_x, k_y]) => {
+                line(&format!(
+                    "    x *= cvg_root({} * x * x);\n    y *= cvg_root({} * y * y);",
+                    float(*k_x),
+                    float(*k_y)
+                ));
+            }
+        }
+    }
+    if let Some(clip) = h.clip {
+        rails(line, &clip);
+    }
+    let period = float(h.period_rad.to_degrees());
+    line("    float angle = 57.2957795f * atan2f(y, x);");
+    line(&format!("    angle = fmodf(angle + 360.0f, {period});"));
+    if let Some(points) = points {
+        line(&format!(
+            "    {{\n        const float at = angle * {};",
+            float(points as f64 / h.period_rad.to_degrees())
+        ));
+        line(&format!(
+            "        int i = (int)at;\n        if (i > {0}) i = {0};\n        if (i < 0) i = 0;",
+            points - 1
+        ));
+        line("        angle += cvg_table[i] + (at - (float)i) * (cvg_table[i + 1] - cvg_table[i]);\n    }");
+        line(&format!("    angle = fmodf(angle + {period}, {period});"));
+    }
+    line("    return angle;");
+}
+
+/// A channel at its rail is told by the other.
+fn rails(line: &mut dyn FnMut(&str), clip: &ChannelClip) {
+    let reached = |name: &str, [low, high]: [f64; 2]| {
+        let sides = [(low, "<="), (high, ">=")].into_iter().filter(|(v, _)| v.is_finite());
+        let told: Vec<String> = sides.map(|(v, sign)| format!("{name} {sign} {}", float(v))).collect();
+        if told.is_empty() { "0".to_owned() } else { told.join(" || ") }
+    };
+    let square = float(clip.amplitude_v.powi(2));
+    line(&format!(
+        "    const int x_out = {}, y_out = {};",
+        reached("x_read", clip.rails_v[0]),
+        reached("y_read", clip.rails_v[1])
+    ));
+    for (own, other) in [("x", "y"), ("y", "x")] {
+        line(&format!("    if ({own}_out && !{other}_out) {{"));
+        line(&format!(
+            "        const float rest = {square} - {other} * {other}, root = rest > 0.0f ? sqrtf(rest) : 0.0f;"
+        ));
+        line(&format!("        {own} = copysignf(fmaxf(root, fabsf({own})), {own});\n    }}"));
+    }
+}
+
+/// What the table adds to an angle, deg, at even angles of a period, and how far straight lines between them are off.
+fn angle_table(h: &Hypothesis, points: usize) -> Option<(Vec<f64>, f64)> {
+    let table = h.angle_table.as_ref()?;
+    let (cycles, step) = (TAU / h.period_rad, h.period_rad / points as f64);
+    let add = |theta: f64| (table.undo(theta, cycles) - theta).to_degrees();
+    let values: Vec<f64> = (0..points).map(|i| add(i as f64 * step)).collect();
+    let off = |i: usize| {
+        let (at, part) = (i / CHECKED, (i % CHECKED) as f64 / CHECKED as f64);
+        let (low, high) = (values[at], values[(at + 1) % points]);
+        (low + part * (high - low) - add((at as f64 + part) * step)).abs()
+    };
+    let worst = (0..CHECKED * points).map(off).fold(0.0, f64::max);
+    Some((values, worst))
+}
+
+/// A table of the angle alone: what is read as atan2(y, x), and what is to be added, at the calibrated amplitude.
+fn lookup(calibration: &Calibration, points: usize) -> Result<String, Failure> {
+    let h = &calibration.hypothesis;
+    let Some([low, high]) = calibration.provenance.amplitude_v else {
+        return Err(Failure::input(
+            "the calibration says no amplitude: a table of the angle holds at one; wanted a .h file",
+        ));
+    };
+    let middle = (low * high).sqrt();
+    let mut fixed = h.clone();
+    fixed.members.retain(|m| step_of(m.id) != Kind::LeftOut);
+    let unread = |r: f64, theta: f64| {
+        let z = fixed.unread(Envelope::new(r * theta.cos(), 0.0, r * theta.sin(), 0.0), &moment());
+        (z.x_c.hypot(z.y_c), z.y_c.atan2(z.x_c))
+    };
+    // the reading, along one direction, of a vibration of this amplitude
+    let reading = |amplitude: f64, theta: f64| halved(0.0, FURTHEST * middle, |r| unread(r, theta).0 < amplitude);
+    if unread(0.0, 0.0).0 >= middle {
+        return Err(Failure::input(
+            "the offsets exceed the amplitude, so that atan2(y, x) does not turn: wanted a .h file, which takes both readings",
+        ));
+    }
+    let directions = || (0..points).map(|i| i as f64 * TAU / points as f64);
+    let amplitude = halved(0.0, FURTHEST * middle, |a| {
+        let mut readings: Vec<f64> = directions().map(|theta| reading(a, theta)).collect();
+        readings.sort_by(f64::total_cmp);
+        readings[points / 2] < middle
+    });
+    let mut s = format!(
+        "# atan2(y, x) and what is to be added to it, deg, at the calibrated amplitude {middle:.6}\nangle_deg,add_deg\n"
+    );
+    for theta in directions() {
+        let (_, angle) = unread(reading(amplitude, theta), theta);
+        let add = (angle - theta + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+        let _ = writeln!(s, "{},{:.6}", theta.to_degrees(), add.to_degrees());
+    }
+    Ok(s)
+}
+
+/// Where `below` turns false.
+fn halved(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
