@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use cvg_calibration::recording::{Campaign, Channel, Naming, ReadError, Recording, RunKind};
 use serde_json::{Value, json};
 
-use crate::figure::{BLUE, GREEN, PURPLE, Series, VERMILLION, plot, plot_png};
+use crate::figure::{BLUE, GREEN, PURPLE, Series, VERMILLION, panels, panels_png};
 use crate::{Failure, input, output};
 
 /// Characters of a column's small picture.
@@ -213,28 +213,31 @@ pub(crate) fn as_value(recording: &Recording) -> Value {
     })
 }
 
-/// The columns over time, each in its own span, so that one figure holds them.
+/// The columns over time, a panel each, over one axis of time. A column that never changes has a panel too.
 fn draw(recording: &Recording, path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high > x.low).collect();
+    let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high >= x.low).collect();
     let stride = recording.len().div_ceil(POINTS).max(1);
-    let names: Vec<String> = shown.iter().map(|x| format!("{} ({:.4} to {:.4})", x.name, x.low, x.high)).collect();
+    let names: Vec<String> = shown.iter().map(named).collect();
     let series: Vec<Series<'_>> = shown
         .iter()
         .zip(&names)
         .zip([BLUE, VERMILLION, GREEN, PURPLE].into_iter().cycle())
         .map(|((x, name), colour)| {
             let values = Channel::of(&x.name).and_then(|c| recording.channel(c)).unwrap_or_default();
-            let unit = |v: f64| (v - x.low) / (x.high - x.low);
-            let points = recording.t_s.iter().zip(values).step_by(stride).filter(|(_, v)| v.is_finite());
-            Series { name, colour, points: points.map(|(t, v)| (*t, unit(*v))).collect(), joined: true }
+            let points = recording.t_s.iter().copied().zip(values.iter().copied()).step_by(stride);
+            Series { name, colour, points: points.filter(|(_, v)| v.is_finite()).collect(), joined: true }
         })
         .collect();
-    let (x, y) = ("time [s]", "share of each column's span");
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-        output::write_with(path, inputs, |part| plot_png(part, x, y, &series))?;
+        output::write_with(path, inputs, |part| panels_png(part, "time [s]", &series))?;
     } else {
-        output::write(path, plot(x, y, &series)?.as_bytes(), inputs)?;
+        output::write(path, panels("time [s]", &series)?.as_bytes(), inputs)?;
     }
     output::tell(format_args!("wrote {}", path.display()));
     Ok(())
+}
+
+/// A column's name as its panel has it, with what is missing of it.
+fn named(x: &Summary) -> String {
+    if x.missing == 0 { x.name.clone() } else { format!("{}, {} values missing", x.name, x.missing) }
 }

@@ -130,7 +130,13 @@ fn inspect_says_what_is_in_a_file_and_what_is_wrong_with_it() {
     for part in ["rows over", "xc_v", "serves as a rotation", "1 rows dropped", "warning: "] {
         assert!(said.contains(part), "{part:?} is not in {said}");
     }
-    assert!(fs::read_to_string(plot).unwrap().contains("<svg"));
+    // a panel for each column, over one axis
+    let svg = fs::read_to_string(plot).unwrap();
+    let columns = ["rate_dps", "xc_v", "xs_v", "yc_v", "ys_v", "vas_v", "vqc_v"];
+    for column in columns {
+        assert_eq!(svg.matches(&format!("\n{column}\n")).count(), 1, "{column}: {svg}");
+    }
+    assert_eq!((svg.matches("<polyline").count() >= columns.len(), svg.matches("time [s]").count()), (true, 1));
     let facts = json(&cvg_ok(&[OsStr::new("inspect"), file.as_os_str(), OsStr::new("--json")]));
     assert_eq!((facts[0]["rotation"].as_bool(), facts[0]["rows_dropped"].as_u64()), (Some(true), Some(1)));
     let campaign = bench.campaign();
