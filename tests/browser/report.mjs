@@ -76,6 +76,17 @@ try {
       assert.ok(inks.every((ink) => /^#[0-9a-f]{6}$/.test(ink)), `${width} ${scheme}: colours ${inks}`);
       const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
       assert.ok(overflow <= 0, `${width} ${scheme}: the page is ${overflow} px too wide`);
+      const beyond = await page.$$eval("main > .scroll, main > section .scroll", (all) =>
+        all.filter((s) => s.scrollWidth > s.clientWidth + 1).map((s) => s.getAttribute("aria-label")));
+      assert.ok(width > 600 || beyond.length === 0, `${width} ${scheme}: tables cut off: ${beyond}`);
+      const cut = await page.$$eval(".plot", (plots) => plots.flatMap((plot) => {
+        const frame = plot.getBoundingClientRect();
+        return [...plot.querySelectorAll("svg text")].filter((text) => {
+          const box = text.getBoundingClientRect();
+          return box.width > 0 && (box.left < frame.left - 1 || box.right > frame.right + 1);
+        }).map((text) => `${plot.id}: ${text.textContent}`);
+      }));
+      assert.deepEqual(cut, [], `${width} ${scheme}: words of figures cut off`);
       await page.screenshot({ path: `${folder}/${scheme}-${width}.png`, fullPage: true });
       if (width === 1440) {
         await page.evaluate(axe.source);

@@ -272,6 +272,60 @@ fn a_planted_nonlinearity_of_200_ppm_is_found_within_a_tenth() {
     assert!(low < 0.0 && high > 0.0 && value.abs() < 5.0, "no asymmetry was planted: {value} ({low} to {high})");
 }
 
+// Temperature
+
+/// Two rates both ways at three temperatures; each run's rows have its temperature.
+fn over_temperature(change: impl Fn(f64, f64) -> f64) -> Bench {
+    let mut scenario = String::from(
+        "device = \"oven\"\nangular_gain = 0.78\nnoise_v = 2e-5\ntau_s = 10.0\nseed = 5\n\
+         effects = [{ id = \"detection-gain-mismatch\", detection_gain_ratio = 1.0132 }]\n",
+    );
+    let points: Vec<(f64, f64)> =
+        [-20.0, 20.0, 60.0].into_iter().flat_map(|t| [400.0, -400.0, 200.0].map(|rate| (t, rate))).collect();
+    for (t, rate) in &points {
+        let _ = write!(
+            scenario,
+            "\n[[run]]\nkind = \"rotation\"\nfile = \"{t:+}{rate:+}.csv\"\nrate_dps = {rate:.1}\nduration_s = 4.0\nsettle_s = 0.5\n"
+        );
+    }
+    let bench = Bench::simulated(cvg_simulator::Scenario::parse(&scenario).unwrap().settings().clone());
+    for (t, rate) in points {
+        bench.change(&format!("{t:+}{rate:+}.csv"), |text| {
+            let mut sheet = Sheet::of(&text);
+            sheet.set("rate_dps", |_, v| change(t, v));
+            sheet.header.push("temp_c".into());
+            sheet.rows.iter_mut().for_each(|row| row.push(t.to_string()));
+            sheet.text()
+        });
+    }
+    bench
+}
+
+#[test]
+fn gain_and_bias_are_told_over_the_temperature_of_the_runs() {
+    // the instrument turns by k (1 + 2e-5 τ) Ω and drifts by 1e-4 τ deg/s more: as if the table turned otherwise than it says
+    let bench = over_temperature(|t, v| (v - 1e-4 * t / 0.78) / (1.0 + 2e-5 * t));
+    let out = identified(&bench);
+    let r: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
+    let t = &r["temperature"];
+    println!("{t:#}");
+    assert_eq!(
+        (t["runs"].as_u64(), t["range_c"][0].as_f64(), t["range_c"][1].as_f64()),
+        (Some(9), Some(-20.0), Some(60.0))
+    );
+    let [gain, low, high] = estimate(&t["angular_gain_per_k"]);
+    assert!((gain / (0.78 * 2e-5) - 1.0).abs() < 0.05 && low < gain && gain < high, "{t}");
+    // θ̇ = −k Ω: what the table turns more, the pattern goes back
+    let [bias, ..] = estimate(&t["bias_dps_per_k"]);
+    assert!((bias.abs() / 1e-4 - 1.0).abs() < 0.1, "{t}");
+    let [ratio, low, high] = estimate(&t["detection_gain_ratio_per_k"]);
+    assert!(low < 0.0 && high > 0.0 && ratio.abs() < 1e-6, "no slope of the ratio was planted: {t}");
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("Slopes over the temperature") && page.contains("plot-temperature"));
+    let (effects, figures) = (page.find("id=\"effects\"").unwrap(), page.find("id=\"look\"").unwrap());
+    assert!(effects < page.find("id=\"parameters\"").unwrap() && page.find("id=\"parameters\"").unwrap() < figures);
+}
+
 // Compensation
 
 #[test]

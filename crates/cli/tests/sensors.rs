@@ -210,3 +210,36 @@ fn a_constant_rate_of_the_campaign_stands_in_for_the_column() {
         assert_eq!(found[key], wanted[key], "{key}");
     }
 }
+
+#[test]
+fn what_is_recorded_in_counts_is_said_in_counts() {
+    let folder = TempDir::new().unwrap();
+    let whole = |text: String| -> String {
+        let cell = |(at, cell): (usize, &str)| match (at, cell.parse::<f64>()) {
+            (0, _) | (_, Err(_)) => cell.to_owned(),
+            (_, Ok(v)) => format!("{v:.0}"),
+        };
+        text.lines().map(|line| line.split(',').enumerate().map(cell).collect::<Vec<_>>().join(",") + "\n").collect()
+    };
+    let counted = whole(turned_by_hand(20_000.0, 0.0, f64::INFINITY, false));
+    let stated = turned_by_hand(1.0, 0.0, f64::INFINITY, false).replacen('\n', "\ns,uT,uT\n", 1);
+    let volts = turned_by_hand(1.0, 0.0, f64::INFINITY, false);
+    for (text, unit) in [(counted, "counts"), (stated, "uT"), (volts, "V")] {
+        let (file, out) = (written(&folder, "encoder.csv", &text), folder.path().join(unit));
+        let arguments: [&OsStr; 5] =
+            ["identify".as_ref(), file.as_ref(), "--sensor".as_ref(), "--out".as_ref(), out.as_ref()];
+        let said = cvg_ok(&arguments);
+        let r: Value = serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
+        let units: Vec<&str> = r["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|e| e["parameters"].as_array().unwrap())
+            .map(|p| p["unit"].as_str().unwrap())
+            .collect();
+        assert!(units.contains(&unit) && (unit == "V" || !units.iter().any(|u| u.contains('V'))), "{units:?}");
+        assert!(said.contains(&format!(" {unit}, offset_y")), "{said}");
+        let calibration = fs::read_to_string(out.join("calibration.toml")).unwrap();
+        assert_eq!(calibration.contains(&format!("readout_unit = \"{unit}\"")), unit != "V", "{calibration}");
+    }
+}

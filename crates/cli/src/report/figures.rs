@@ -1,6 +1,7 @@
 //! The figures of the page, as Plotly takes them. Colours are names that the page turns into those of its theme.
 
 use cvg_calibration::plots::{EffectSizes, PlotData};
+use cvg_calibration::report::RunReport;
 use cvg_calibration::{BiasCurve, Identification};
 use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
@@ -58,6 +59,7 @@ pub(super) fn all(identified: &Identification) -> Vec<Figure> {
     out.extend(residual(plots));
     out.extend(memory(plots));
     out.extend(histogram(plots));
+    out.extend(temperature(&identified.report.runs));
     out.extend(correlations(plots));
     out
 }
@@ -74,6 +76,12 @@ pub(super) fn shorts(values: impl IntoIterator<Item = f64>) -> Value {
 
 pub(super) fn axis(title: &str) -> Value {
     json!({"title": {"text": title}})
+}
+
+/// An axis of an angle within its period, deg: ticks at multiples of 45° or 90°.
+pub(super) fn angles_axis(title: &str, period_deg: f64) -> Value {
+    let every = if period_deg > 200.0 { 90 } else { 45 };
+    json!({"title": {"text": title}, "dtick": every, "tick0": 0})
 }
 
 /// The file's name without its folder.
@@ -112,8 +120,11 @@ fn bias(identified: &Identification) -> Figure {
             "hovertemplate": "%{x:.2f}°: %{y:.5f}°<br>%{text}",
         }));
     }
-    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("angle error [deg]"), "showlegend": false});
-    let caption = "Angle minus the best line on held-out data, before any compensation, after the paper's model, and \
+    let pattern = identified.report.instrument == "gyroscope" && !super::tables::is_rate_gyroscope(identified);
+    let over = if !pattern { "angle [deg]" } else { "pattern angle [deg]" };
+    let x = angles_axis(over, identified.calibration.hypothesis.period_rad.to_degrees());
+    let layout = json!({"xaxis": x, "yaxis": axis("angle error [deg]"), "showlegend": false});
+    let caption = "Angle minus the best line on held-out data, before any compensation, after the declared effects, and \
                    after all. Switch off a stage to enlarge the others. Where points of a run leave the curve, its error \
                    changes with time too.";
     Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
@@ -131,7 +142,7 @@ fn angle(plots: &PlotData) -> Option<Figure> {
         line("unwrapped", &curve.unwrapped_deg, "y2", "@raw"),
     ];
     let layout = json!({
-        "xaxis": axis("time [s]"), "yaxis": axis("pattern angle [deg]"),
+        "xaxis": axis("time [s]"), "yaxis": angles_axis("pattern angle [deg]", 180.0),
         "yaxis2": {"title": {"text": "unwrapped [deg]"}, "overlaying": "y", "side": "right", "showgrid": false},
     });
     let caption = format!("As recorded in {}, the first held-out turns of the pattern.", run_name(&curve.name));
@@ -182,7 +193,8 @@ fn drive(plots: &PlotData) -> Option<Figure> {
             }));
         }
     }
-    let layout = json!({"xaxis": axis("pattern angle [deg]"), "yaxis": axis("energy control output v_as [V]")});
+    let layout =
+        json!({"xaxis": angles_axis("pattern angle [deg]", 180.0), "yaxis": axis("energy control output v_as [V]")});
     let caption = "As recorded, and what would hold the true amplitude with the identified electronics undone. What \
                    still depends on the angle afterwards is damping. Other runs can be switched on in the legend.";
     Some(Figure::new("drive", "Energy control over the pattern angle", caption, traces, layout).wide())
@@ -334,6 +346,53 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
     );
     (runs.len() > 1)
         .then(|| Figure::new(&format!("scaling-{id}"), &format!("Scaling of {id}"), caption, traces, layout))
+}
+
+/// Gain and bias of runs over their temperatures, and the gain ratio.
+pub(super) fn temperature(runs: &[RunReport]) -> Option<Figure> {
+    let warm: Vec<(f64, &RunReport)> = runs.iter().filter_map(|r| Some((r.temp_c?, r))).collect();
+    type Told = fn(&RunReport) -> Option<(f64, f64)>;
+    let told: [(&str, Told); 3] = [
+        ("k", |r| r.angular_gain.map(|e| (e.value, e.half_width()))),
+        ("bias [deg/s]", |r| r.bias_dps.map(|e| (e.value, e.half_width()))),
+        ("G<sub>Dy</sub>/G<sub>Dx</sub>", |r| r.detection_gain_ratio.map(|v| (v, 0.0))),
+    ];
+    let panels: Vec<_> = told
+        .into_iter()
+        .map(|(name, of)| {
+            (name, warm.iter().filter_map(|(t, r)| Some((*t, of(r)?, run_name(&r.file)))).collect::<Vec<_>>())
+        })
+        .filter(|(_, points)| points.len() > 1)
+        .collect();
+    let share = 1.0 / panels.len().max(1) as f64;
+    let mut layout = json!({"showlegend": false, "height": 150 * panels.len() + 60});
+    let mut traces = Vec::new();
+    for (at, ((name, points), ink)) in panels.iter().zip(INKS).enumerate() {
+        let number = if at == 0 { String::new() } else { (at + 1).to_string() };
+        // the first at the top, all over the axis of the last
+        let top = 1.0 - share * at as f64;
+        let mut y = axis(name);
+        y["domain"] = json!([top - 0.82 * share, top]);
+        layout[format!("yaxis{number}")] = y;
+        traces.push(json!({
+            "type": "scatter", "mode": "markers", "name": name, "xaxis": "x", "yaxis": format!("y{number}"),
+            "x": shorts(points.iter().map(|p| p.0)), "y": points.iter().map(|p| exact(p.1.0)).collect::<Vec<_>>(),
+            "error_y": {"type": "data", "array": shorts(points.iter().map(|p| p.1.1)), "color": "@muted"},
+            "text": points.iter().map(|p| p.2.clone()).collect::<Vec<_>>(), "marker": {"size": 8, "color": ink},
+            "hovertemplate": "%{text}<br>%{x:.2f} °C: %{y}<extra></extra>",
+        }));
+    }
+    let last = if panels.len() > 1 { format!("y{}", panels.len()) } else { "y".to_owned() };
+    layout["xaxis"] = json!({"title": {"text": "mean temperature of the run [°C]"}, "anchor": last});
+    let caption = "What each run tells by itself, with its 95 % interval, over its temperature. Slopes with their intervals stand \
+                   under Temperature.";
+    (!panels.is_empty()).then(|| Figure::new("temperature", "Temperature", caption, traces, layout).wide())
+}
+
+/// A number with ten significant digits: what differs little from run to run is to be seen.
+fn exact(value: f64) -> Value {
+    let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
+    json!(rounded)
 }
 
 fn correlations(plots: &PlotData) -> Option<Figure> {

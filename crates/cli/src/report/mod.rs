@@ -37,14 +37,15 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     warnings(&mut h, &r.warnings);
     stages(&mut h, identified);
     h.push_str(
-        "<nav aria-label=\"sections\"><a href=\"#look\">Figures</a><a href=\"#parameters\">Parameters</a><a \
-         href=\"#effects\">Effects</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
+        "<nav aria-label=\"sections\"><a href=\"#effects\">Effects</a><a href=\"#parameters\">Parameters</a><a \
+         href=\"#look\">Figures</a><a href=\"#runs\">Runs</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
          href=\"#files\">Files</a></nav></header><main>",
     );
     let still = clouds::bias_svg(identified, STILL_POINTS, true)?;
     let without = "<p>The figures need scripts, which this file brings along; here is one without.</p>";
+    tables::found(&mut h, identified);
     draw(&mut h, &format!("{without}{still}"), &figures);
-    tables::all(&mut h, identified);
+    tables::besides(&mut h, identified);
     let footer = "Errors are angle minus the best line, angular gain and bias refitted on the same held-out samples.";
     finish(&mut h, &commands::report_json(identified)?, &r.schema, footer, &figures)?;
     Ok(h)
@@ -118,7 +119,9 @@ fn stages(h: &mut String, identified: &Identification) {
         let _ = write!(h, "<div class=\"stage {class}\"><b>{value}</b><span>{what}</span></div>");
     };
     card("raw", held.raw.map(|e| e.rms_deg), "raw, as recorded");
-    card("declared", Some(held.declared.rms_deg), "after the paper's model");
+    let sensor = identified.report.instrument == "sensor" || tables::is_rate_gyroscope(identified);
+    let declared = if sensor { "after the declared effects" } else { "after the paper's model" };
+    card("declared", Some(held.declared.rms_deg), declared);
     card("discovered", Some(held.discovered.rms_deg), "after all that was found");
     card("floor", Some(held.noise_floor_deg), "noise of the recording");
     h.push_str("</div>");

@@ -7,9 +7,9 @@ use cvg_calibration::report::survey::Survey;
 use cvg_calibration::report::{Allan, Estimate};
 use serde_json::json;
 
-use super::figures::{Figure, axis, shorts};
+use super::figures::{self, Figure, axis, shorts};
 use super::finding::{degrees, interval, times};
-use super::tables::{row, table};
+use super::tables::{row, runs, table, temperature};
 use super::{begin, draw, escape, finish, warnings};
 use crate::Failure;
 use crate::commands::significant;
@@ -18,7 +18,10 @@ use crate::commands::significant;
 pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     let r = &surveyed.report;
     let figures: Vec<Figure> =
-        [circle(surveyed), radius(surveyed), r.allan.as_ref().map(deviation)].into_iter().flatten().collect();
+        [circle(surveyed), radius(surveyed), r.allan.as_ref().map(deviation), figures::temperature(&r.runs)]
+            .into_iter()
+            .flatten()
+            .collect();
     let mut h = String::with_capacity(2 << 20);
     begin(&mut h, &r.device, r.instrument);
     headline(&mut h, r);
@@ -27,6 +30,8 @@ pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     parameters(&mut h, r);
     effects(&mut h, r);
     draw(&mut h, "<p>The figures need scripts, which this file brings along.</p>", &figures);
+    runs(&mut h, &r.runs);
+    temperature(&mut h, r.temperature.as_ref());
     files(&mut h, r);
     let json = serde_json::to_string_pretty(r).map_err(Failure::input)?;
     finish(&mut h, &json, r.schema, "There is no angle error: nothing was recorded to count it against.", &figures)?;
@@ -66,7 +71,9 @@ fn parameters(h: &mut String, r: &Survey) {
             estimate("angle random walk", a.angle_random_walk_deg_sqrt_h.as_ref(), "deg/√h");
             estimate("bias instability", Some(&a.bias_instability_dph), "deg/h");
         }
-        for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
+        let once = |name: &str| name != "detection_gain_ratio" || r.detection_gain_ratio.is_none();
+        let all = r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p)));
+        for (e, p) in all.filter(|(_, p)| once(&p.name)) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));
             let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
                 Some([value, low, high]) => (value, format!("{low} … {high}")),
@@ -114,6 +121,7 @@ fn circle(surveyed: &Surveyed) -> Option<Figure> {
     let mut layout =
         json!({"xaxis": axis("x over the mean radius"), "yaxis": axis("y over the mean radius"), "showlegend": true});
     layout["yaxis"]["scaleanchor"] = json!("x");
+    layout["xaxis"]["constrain"] = json!("domain");
     let caption = "The two channels against each other on held-out rows: as recorded, with what was found undone, and the \
                    circle that a sensor without errors draws.";
     Some(Figure::new("circle", "X and Y", caption, traces, layout))

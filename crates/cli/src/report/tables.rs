@@ -3,22 +3,42 @@
 use std::fmt::Write as _;
 
 use cvg_calibration::Identification;
-use cvg_calibration::report::{Estimate, Report};
+use cvg_calibration::report::{Estimate, Report, RunReport, Temperature};
 
 use super::escape;
 use super::figures::run_name;
-use super::finding::interval;
+use super::finding::{interval, measured};
 use super::further::{Number, further};
 use crate::commands::significant;
 use crate::standard;
 
 /// Correlations that a reader should know of.
 const STRONG: f64 = 0.5;
+/// A mean rate below this, deg/s, is that of a rotation there and back.
+const BOTH_WAYS: f64 = 0.005;
+/// Periods beyond this are a whole turn, and no pattern's half.
+const WHOLE_TURN_RAD: f64 = 4.0;
 
-pub(super) fn all(h: &mut String, identified: &Identification) {
-    let r = &identified.report;
+/// A gyroscope whose output is an angle of its own turns once a turn and has no pattern.
+pub(super) fn is_rate_gyroscope(identified: &Identification) -> bool {
+    let h = &identified.calibration.hypothesis;
+    identified.report.instrument == "gyroscope" && h.period_rad > WHOLE_TURN_RAD
+}
+
+/// What was found: before the figures.
+pub(super) fn found(h: &mut String, identified: &Identification) {
+    let has_pattern = identified.report.instrument == "gyroscope" && !is_rate_gyroscope(identified);
+    let declared = if has_pattern { "those of the paper's model" } else { "unequal gains of two channels" };
+    effects(h, &identified.report, declared);
     parameters(h, identified);
-    effects(h, r);
+}
+
+/// How it was found, run by run, and what is left: after the figures.
+pub(super) fn besides(h: &mut String, identified: &Identification) {
+    let r = &identified.report;
+    runs(h, &r.runs);
+    temperature(h, r.temperature.as_ref());
+    correlations(h, identified);
     steps(h, identified);
     left(h, r);
     words(h, r);
@@ -36,8 +56,23 @@ pub(super) fn table(h: &mut String, label: &str, columns: &[&str], rows: impl Fn
         let _ = write!(h, "<th scope=\"col\">{c}</th>");
     }
     h.push_str("</tr></thead><tbody>");
-    rows(h);
+    let mut body = String::new();
+    rows(&mut body);
+    labelled(h, &body, columns);
     h.push_str("</tbody></table></div>");
+}
+
+/// The rows, each cell with the name of its column, which a narrow page writes in front of it.
+fn labelled(h: &mut String, body: &str, columns: &[&str]) {
+    for line in body.split_inclusive("</tr>") {
+        for (at, part) in line.split("<td").enumerate() {
+            if at > 0 {
+                let name = columns.get(at - 1).copied().unwrap_or_default();
+                let _ = write!(h, "<td data-label=\"{name}\"");
+            }
+            h.push_str(part);
+        }
+    }
 }
 
 pub(super) fn row(h: &mut String, cells: &[&str]) {
@@ -52,6 +87,8 @@ pub(super) fn row(h: &mut String, cells: &[&str]) {
 fn parameters(h: &mut String, identified: &Identification) {
     let r = &identified.report;
     h.push_str("<h2 id=\"parameters\">Parameters</h2>");
+    // of an output that is an angle or a rate no channel was read
+    let rates_alone = is_rate_gyroscope(identified);
     table(h, "Values with 95 % intervals", &["parameter", "value", "95 % interval", "unit"], |h| {
         let mut estimate = |name: &str, e: Option<&Estimate>| match e {
             Some(e) => {
@@ -61,15 +98,23 @@ fn parameters(h: &mut String, identified: &Identification) {
             None => row(h, &[name, "not told by this campaign", "", "1"]),
         };
         estimate("angular gain k (scale factor)", Some(&r.angular_gain).filter(|k| k.is_told()));
-        estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref());
-        if r.instrument == "gyroscope" {
+        if !rates_alone {
+            estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref());
+        }
+        if r.instrument == "gyroscope" && !rates_alone {
             estimate("actuation gain ratio G<sub>Ax</sub>/G<sub>Ay</sub>", r.actuation_gain_ratio.as_ref());
         }
         for Number { name, value, unit } in further(r) {
             let [value, low, high] = interval(value.value, value.ci95);
             row(h, &[name, &value, &format!("{low} … {high}"), unit]);
         }
-        for (e, p) in r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p))) {
+        let once = |name: &str| match name {
+            "detection_gain_ratio" => r.detection_gain_ratio.is_none(),
+            "actuation_gain_ratio" => r.actuation_gain_ratio.is_none(),
+            _ => true,
+        };
+        let all = r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p)));
+        for (e, p) in all.filter(|(_, p)| once(&p.name)) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));
             let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
                 Some([value, low, high]) => (value, format!("{low} … {high}")),
@@ -78,6 +123,9 @@ fn parameters(h: &mut String, identified: &Identification) {
             row(h, &[&name, &value, &ends, &escape(&p.unit)]);
         }
     });
+}
+
+fn correlations(h: &mut String, identified: &Identification) {
     let Some(c) = identified.plots.as_ref().map(|p| &p.correlations) else { return };
     let mut strong: Vec<(f64, &str, &str)> = Vec::new();
     for i in 0..c.names.len() {
@@ -85,6 +133,7 @@ fn parameters(h: &mut String, identified: &Identification) {
     }
     strong.retain(|s| s.0.abs() >= STRONG);
     strong.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    h.push_str("<h2 id=\"correlations-of\">Correlations and steps</h2>");
     if strong.is_empty() {
         let _ = write!(h, "<p>No two parameters are correlated by {STRONG} or more.</p>");
         return;
@@ -96,8 +145,13 @@ fn parameters(h: &mut String, identified: &Identification) {
     });
 }
 
-fn effects(h: &mut String, r: &Report) {
-    h.push_str("<h2 id=\"effects\">Effects</h2>");
+fn effects(h: &mut String, r: &Report, declared: &str) {
+    let _ = write!(
+        h,
+        "<h2 id=\"effects\">Effects</h2><p>Declared effects are {declared}, which every campaign is asked for; \
+         discovered ones were added because the data ask for them; an empirical one describes what no effect of the library \
+         explains.</p>",
+    );
     let columns =
         ["effect", "origin", "held-out rms [deg]", "evidence", "confounded with, and the run that would tell"];
     table(h, "What the data supports", &columns, |h| {
@@ -206,7 +260,7 @@ fn files(h: &mut String, r: &Report) {
         for x in &r.runs {
             let rate = match x.rate_dps {
                 // a rotation whose mean is nothing went there and back
-                Some(v) if x.kind == "rotation" && v.abs() < 0.005 => "both ways".to_owned(),
+                Some(v) if x.kind == "rotation" && v.abs() < BOTH_WAYS => "both ways".to_owned(),
                 Some(v) => format!("{v:.2}"),
                 None => "—".to_owned(),
             };
@@ -214,6 +268,79 @@ fn files(h: &mut String, r: &Report) {
             let dropped = if x.dropped.is_empty() { "none".into() } else { escape(&x.dropped.join("; ")) };
             let rows = x.rows.to_string();
             row(h, &[&escape(&run_name(&x.file)), &x.kind, &x.r#use, &rows, &rate, &tau, &dropped]);
+        }
+    });
+}
+
+/// What each run tells by itself.
+pub(super) fn runs(h: &mut String, runs: &[RunReport]) {
+    h.push_str("<h2 id=\"runs\">Runs</h2>");
+    let told = |e: Option<Estimate>| e.map_or("—".to_owned(), |e| measured(e.value, Some(e.ci95)));
+    let number = |v: Option<f64>, digits: usize| v.map_or("—".to_owned(), |v| format!("{v:.digits$}"));
+    let columns = [
+        "run",
+        "way",
+        "rate [deg/s]",
+        "k",
+        "bias [deg/s]",
+        "rms [deg]",
+        "spikes",
+        "temperature [°C]",
+        "agrees with the others",
+    ];
+    table(h, "What each run tells by itself", &columns, |h| {
+        for x in runs {
+            let way = match x.rate_dps {
+                _ if x.kind != "rotation" => x.kind.as_str(),
+                Some(v) if v >= BOTH_WAYS => "positive",
+                Some(v) if v <= -BOTH_WAYS => "negative",
+                Some(_) => "both",
+                None => "—",
+            };
+            let agrees = x.agrees.map_or("—", |a| if a { "yes" } else { "no" });
+            row(
+                h,
+                &[
+                    &escape(&run_name(&x.file)),
+                    way,
+                    &number(x.rate_dps, 2),
+                    &told(x.angular_gain),
+                    &told(x.bias_dps),
+                    &number(x.rms_deg, 5),
+                    &x.spikes.to_string(),
+                    &number(x.temp_c, 2),
+                    agrees,
+                ],
+            );
+        }
+    });
+}
+
+/// How that goes with the temperature.
+pub(super) fn temperature(h: &mut String, told: Option<&Temperature>) {
+    let Some(t) = told else { return };
+    let [low, high] = t.range_c;
+    let _ = write!(
+        h,
+        "<h2 id=\"temperature\">Temperature</h2><p>{} runs from {low:.1} to {high:.1} °C; straight lines, with 95 % intervals from \
+         how the runs scatter about them.{}</p>",
+        t.runs,
+        t.reason.as_ref().map_or(String::new(), |r| format!(" Not told: {}.", escape(r)))
+    );
+    let rows = [
+        ("angular gain k", t.angular_gain_per_k, "1/K"),
+        ("bias", t.bias_dps_per_k, "deg/s/K"),
+        ("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", t.detection_gain_ratio_per_k, "1/K"),
+    ];
+    if rows.iter().all(|r| r.1.is_none()) {
+        return;
+    }
+    table(h, "Slopes over the temperature", &["of", "per K", "95 % interval", "unit", "beyond its interval"], |h| {
+        for (name, e, unit) in rows {
+            let Some(e) = e else { continue };
+            let [value, low, high] = interval(e.value, e.ci95);
+            let seen = if e.ci95[0] > 0.0 || e.ci95[1] < 0.0 { "yes" } else { "no" };
+            row(h, &[name, &value, &format!("{low} … {high}"), unit, seen]);
         }
     });
 }
