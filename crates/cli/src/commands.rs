@@ -14,6 +14,7 @@ use crate::arguments::Arguments;
 use crate::limits::Limits;
 use crate::progress::Progress;
 use crate::report::further::{Number, further};
+use crate::report::significant;
 use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
@@ -148,7 +149,7 @@ impl Told {
     /// report.json and, where something is undone, calibration.toml.
     pub(crate) fn facts(answer: &Answer) -> Result<(String, Option<String>), Failure> {
         match answer {
-            Answer::Identified(identified) => Ok((report_json(identified)?, Some(identified.calibration.to_text()))),
+            Answer::Identified(identified) => Ok((report::json(identified)?, Some(identified.calibration.to_text()))),
             Answer::Surveyed(surveyed) => {
                 let json = serde_json::to_string_pretty(&surveyed.report).map_err(Failure::input)?;
                 Ok((json, surveyed.calibration.as_ref().map(Calibration::to_text)))
@@ -208,12 +209,7 @@ pub(crate) const RESULTS: [&str; 3] = ["report.json", "report.html", "calibratio
 
 /// The texts of [`RESULTS`].
 pub(crate) fn results(identified: &Identification) -> Result<[String; 3], Failure> {
-    Ok([report_json(identified)?, report::page(identified)?, identified.calibration.to_text()])
-}
-
-/// report.json
-pub(crate) fn report_json(identified: &Identification) -> Result<String, Failure> {
-    serde_json::to_string_pretty(&identified.report).map_err(Failure::input)
+    Ok([report::json(identified)?, report::page(identified)?, identified.calibration.to_text()])
 }
 
 /// `cvg man`: a manual page for the program and for each of its commands.
@@ -293,16 +289,4 @@ fn pole_pairs(k: f64) -> String {
     let sense = if k < 0.0 { "with the reference" } else { "reversed: against the reference" };
     let pairs = if k.abs() == 1.0 { "1 period a turn".to_owned() } else { format!("{} pole pairs", k.abs()) };
     format!("{k}: {pairs}, counting {sense}")
-}
-
-/// A value with some six significant digits.
-pub(crate) fn significant(value: f64) -> String {
-    let size = value.abs();
-    if value == value.trunc() && size < 1e6 {
-        format!("{value}")
-    } else if (1e-2..1e4).contains(&size) {
-        format!("{value:.6}")
-    } else {
-        format!("{value:.5e}")
-    }
 }

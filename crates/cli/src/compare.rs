@@ -7,7 +7,7 @@ use std::path::Path;
 use cvg_calibration::calibration::Calibration;
 use serde_json::{Value, json};
 
-use crate::commands::significant;
+use crate::report::significant;
 use crate::{Failure, output};
 
 /// A parameter of one answer.

@@ -6,7 +6,7 @@ use cvg_calibration::Identification;
 use cvg_calibration::recording::Campaign;
 use cvg_simulator::Scenario;
 
-use crate::{Failure, clouds, commands, output};
+use crate::{Failure, clouds, commands, output, report};
 
 /// Points of the figure that the README shows.
 const README_POINTS: usize = 900;
@@ -26,7 +26,7 @@ pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
     set.add("bias.svg", clouds::bias_svg(&identified, README_POINTS, true)?.as_bytes())?;
     set.commit()?;
     if json {
-        output::answer(&format!("{}\n", commands::report_json(&identified)?))?;
+        output::answer(&format!("{}\n", report::json(&identified)?))?;
         return Ok(());
     }
     output::answer(&commands::summary(&identified))?;

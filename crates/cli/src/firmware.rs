@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::Instrument;
-use cvg_calibration::{ChannelClip, Hypothesis};
+use cvg_calibration::{ChannelClip, Hypothesis, Member};
 use cvg_model::Envelope;
-use cvg_model::effects::{EffectId, Moment, Stage, Values};
+use cvg_model::effects::{EffectId, Inverse, Moment, Stage, Values};
 
 use crate::{Failure, output};
 
@@ -38,7 +38,7 @@ pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: usize) -> Re
     }
     let steps = steps(h)?;
     let left_out: Vec<&str> =
-        h.members.iter().filter(|m| step_of(m.id) == Kind::LeftOut).map(|m| m.id.description().id).collect();
+        h.members.iter().filter(|m| kind(m) == Kind::LeftOut).map(|m| m.id.description().id).collect();
     if !left_out.is_empty() {
         output::tell(format_args!(
             "not in it: {}, which two readings alone do not tell: it follows the table, the clock, the rate or the temperature",
@@ -52,22 +52,30 @@ pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: usize) -> Re
     Ok(())
 }
 
+/// What becomes of an effect.
 #[derive(Debug, PartialEq)]
 enum Kind {
     Affine,
-    Cubic,
+    /// ¾κ of x and of y
+    Cubic([f64; 2]),
     LeftOut,
     Refused,
 }
 
-fn step_of(id: EffectId) -> Kind {
-    match id {
-        EffectId::DetectionOffset | EffectId::DetectionGainMismatch | EffectId::DetectionSkew => Kind::Affine,
-        EffectId::DetectionCubic => Kind::Cubic,
-        _ if id.description().stage != Stage::Readout || id.acts_on_angle() || id.in_time() || id.by_temperature() => {
+fn kind(m: &Member) -> Kind {
+    let id = m.id;
+    match id.inverse(&m.values) {
+        Inverse::Affine => Kind::Affine,
+        Inverse::Cubic(cubic) => Kind::Cubic(cubic.coefficients()),
+        Inverse::Unread
+            if id.description().stage != Stage::Readout
+                || id.acts_on_angle()
+                || id.in_time()
+                || id.by_temperature() =>
+        {
             Kind::LeftOut
         }
-        _ => Kind::Refused,
+        Inverse::Unread => Kind::Refused,
     }
 }
 
@@ -87,7 +95,7 @@ fn moment() -> Moment<f64> {
 fn steps(h: &Hypothesis) -> Result<Vec<Step>, Failure> {
     let mut out: Vec<Step> = Vec::new();
     for m in h.members.iter().rev() {
-        match step_of(m.id) {
+        match kind(m) {
             Kind::LeftOut => {}
             Kind::Refused => {
                 let id = m.id.description().id;
@@ -95,10 +103,7 @@ fn steps(h: &Hypothesis) -> Result<Vec<Step>, Failure> {
                     "{id}: has no form in this header; wanted offset, gain, skew and cubic"
                 )));
             }
-            Kind::Cubic => {
-                let (mean, half) = (m.values[0], m.values[1]);
-                out.push(Step::Cubic([0.75 * (mean + half), 0.75 * (mean - half)]));
-            }
+            Kind::Cubic(coefficients) => out.push(Step::Cubic(coefficients)),
             Kind::Affine => {
                 let next = matrix(m.id, &m.values);
                 match out.last_mut() {
@@ -294,7 +299,7 @@ fn lookup(calibration: &Calibration, points: usize) -> Result<String, Failure> {
     };
     let middle = (low * high).sqrt();
     let mut fixed = h.clone();
-    fixed.members.retain(|m| step_of(m.id) != Kind::LeftOut);
+    fixed.members.retain(|m| kind(m) != Kind::LeftOut);
     let unread = |r: f64, theta: f64| {
         let z = fixed.unread(Envelope::new(r * theta.cos(), 0.0, r * theta.sin(), 0.0), &moment());
         (z.x_c.hypot(z.y_c), z.y_c.atan2(z.x_c))

@@ -14,11 +14,12 @@ use cvg_calibration::report::refused::About;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use crate::commands::{RESULTS, Told, significant};
+use crate::commands::{RESULTS, Told};
 use crate::compare::{Parameter, of_report};
 use crate::input::{Wanted, campaign, files};
 use crate::limits::Limits;
 use crate::progress::Progress;
+use crate::report::significant;
 use crate::{Failure, output};
 
 /// What is said of all devices together.

@@ -4,7 +4,7 @@ use cvg_calibration::Origin;
 use cvg_calibration::report::{EffectReport, Report};
 use cvg_model::effects::EffectId;
 
-use crate::commands::significant;
+use crate::report::significant;
 
 /// A residual within this factor of the noise is the noise.
 const AT_THE_NOISE: f64 = 1.2;

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use self::figures::Figure;
 use self::finding::{finding, times};
-use crate::{Failure, clouds, commands, output};
+use crate::{Failure, clouds, output};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -26,6 +26,23 @@ const PLOTLY: &str = include_str!("../../assets/plotly-basic.min.js");
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:";
 /// Points of the still picture for readers without scripts.
 const STILL_POINTS: usize = 600;
+
+/// report.json
+pub(crate) fn json(identified: &Identification) -> Result<String, Failure> {
+    serde_json::to_string_pretty(&identified.report).map_err(Failure::input)
+}
+
+/// A value with some six significant digits.
+pub(crate) fn significant(value: f64) -> String {
+    let size = value.abs();
+    if value == value.trunc() && size < 1e6 {
+        format!("{value}")
+    } else if (1e-2..1e4).contains(&size) {
+        format!("{value:.6}")
+    } else {
+        format!("{value:.5e}")
+    }
+}
 
 /// The report of an identification.
 pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
@@ -47,7 +64,7 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     draw(&mut h, &format!("{without}{still}"), &figures);
     tables::besides(&mut h, identified);
     let footer = "Errors are angle minus the best line, angular gain and bias refitted on the same held-out samples.";
-    finish(&mut h, &commands::report_json(identified)?, &r.schema, footer, &figures)?;
+    finish(&mut h, &json(identified)?, &r.schema, footer, &figures)?;
     Ok(h)
 }
 

@@ -12,7 +12,7 @@ use super::finding::{degrees, interval, times};
 use super::tables::{row, runs, table, temperature};
 use super::{begin, draw, escape, finish, warnings};
 use crate::Failure;
-use crate::commands::significant;
+use crate::report::significant;
 
 /// The page.
 pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {

@@ -9,7 +9,7 @@ use super::escape;
 use super::figures::run_name;
 use super::finding::{interval, measured};
 use super::further::{Number, further};
-use crate::commands::significant;
+use crate::report::significant;
 use crate::standard;
 
 /// Correlations that a reader should know of.

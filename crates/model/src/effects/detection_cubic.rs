@@ -65,6 +65,11 @@ impl<T: Real> Cubic<T> {
         Self { x: three_quarters * (kappa + difference), y: three_quarters * (kappa - difference) }
     }
 
+    /// ¾κ of X and of Y.
+    pub fn coefficients(&self) -> [T; 2] {
+        [self.x, self.y]
+    }
+
     /// The vibration behind the readout `e`.
     #[inline(always)]
     pub fn undo(&self, e: Envelope<T>) -> Envelope<T> {

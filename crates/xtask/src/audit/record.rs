@@ -1,12 +1,15 @@
 //! What was claimed set beside what came of it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::claims::{Chapter, Meets, Named, Names, Requirement, Test};
-use super::runners::Tests;
+
+/// Status by file and by the name that the runner gives a test.
+pub(crate) type Tests = BTreeMap<String, BTreeMap<String, Status>>;
 
 /// What a runner said of a test or a proof.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

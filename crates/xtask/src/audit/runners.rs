@@ -8,11 +8,8 @@ use std::process::{Command, Stdio};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::record::{Proof, Status};
+use super::record::{Proof, Status, Tests};
 use crate::{prove, source};
-
-/// Status by file and by the name that the runner gives a test.
-pub(crate) type Tests = BTreeMap<String, BTreeMap<String, Status>>;
 
 /// The engines' own tests: what they refuse, and what they assume of `libm`.
 pub(crate) const ENGINES: [&str; 4] = ["exact", "exact_refusals", "rounding", "rounding_refusals"];
