@@ -240,7 +240,7 @@ pub(super) const FAULTS: &[Fault] = &[
         SINGLE,
     ),
     fault(
-        "a phase comes after offsets",
+        "a feed-through comes after offsets",
         "model/src/effects/mod.rs",
         "    DriveFeedthrough => drive_feedthrough::DriveFeedthrough,\n    DetectionOffset => detection_offset::DetectionOffset,",
         "    DetectionOffset => detection_offset::DetectionOffset,\n    DriveFeedthrough => drive_feedthrough::DriveFeedthrough,",
