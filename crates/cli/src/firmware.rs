@@ -87,10 +87,6 @@ enum Step {
     Cubic([f64; 2]),
 }
 
-fn moment() -> Moment<f64> {
-    Moment::default()
-}
-
 /// The readout's effects undone, last first; what is linear one after the other is one matrix.
 fn steps(h: &Hypothesis) -> Result<Vec<Step>, Failure> {
     let mut out: Vec<Step> = Vec::new();
@@ -119,7 +115,7 @@ fn steps(h: &Hypothesis) -> Result<Vec<Step>, Failure> {
 /// What an affine effect does, from where it takes three points.
 fn matrix(id: EffectId, values: &Values<f64>) -> [f64; 6] {
     let at = |x: f64, y: f64| {
-        let z = id.unread(values, Envelope::new(x, 0.0, y, 0.0), &moment());
+        let z = id.unread(values, Envelope::new(x, 0.0, y, 0.0), &Moment::default());
         [z.x_c, z.y_c]
     };
     let (o, x, y) = (at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0));
@@ -301,7 +297,7 @@ fn lookup(calibration: &Calibration, points: usize) -> Result<String, Failure> {
     let mut fixed = h.clone();
     fixed.members.retain(|m| kind(m) != Kind::LeftOut);
     let unread = |r: f64, theta: f64| {
-        let z = fixed.unread(Envelope::new(r * theta.cos(), 0.0, r * theta.sin(), 0.0), &moment());
+        let z = fixed.unread(Envelope::new(r * theta.cos(), 0.0, r * theta.sin(), 0.0), &Moment::default());
         (z.x_c.hypot(z.y_c), z.y_c.atan2(z.x_c))
     };
     // the reading, along one direction, of a vibration of this amplitude

@@ -353,27 +353,22 @@ impl<T: Float> Instrument<T> {
     /// the output's hold, which is ahead of the oscillator's phase at the sample by ω times the delay.
     #[inline(always)]
     fn delayed(&self, f: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
+        let (cos, sin) = self.delay(correction_rad_s);
+        ahead(f, cos, sin)
+    }
+
+    /// Cosine and sine of the carrier's phase in the loop's delay.
+    #[inline(always)]
+    fn delay(&self, correction_rad_s: T) -> (T, T) {
         // the correction's own share is small: first order
         let more = correction_rad_s * self.delay_s;
-        let (cos, sin) = (self.delay_cos - self.delay_sin * more, self.delay_sin + self.delay_cos * more);
-        AxisForces {
-            x_c: f.x_c * cos + f.x_s * sin,
-            x_s: f.x_s * cos - f.x_c * sin,
-            y_c: f.y_c * cos + f.y_s * sin,
-            y_s: f.y_s * cos - f.y_c * sin,
-        }
+        (self.delay_cos - self.delay_sin * more, self.delay_sin + self.delay_cos * more)
     }
 
     /// The commands of a drive that [`Instrument::delayed`] gave.
     fn undelayed(&self, drive: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
-        let more = correction_rad_s * self.delay_s;
-        let (cos, sin) = (self.delay_cos - self.delay_sin * more, self.delay_sin + self.delay_cos * more);
-        AxisForces {
-            x_c: drive.x_c * cos - drive.x_s * sin,
-            x_s: drive.x_s * cos + drive.x_c * sin,
-            y_c: drive.y_c * cos - drive.y_s * sin,
-            y_s: drive.y_s * cos + drive.y_c * sin,
-        }
+        let (cos, sin) = self.delay(correction_rad_s);
+        ahead(drive, cos, -sin)
     }
 
     /// The moment of the window, for readout effects that depend on it.
@@ -387,6 +382,17 @@ impl<T: Float> Instrument<T> {
             warmer_k: T::zero(),
             drive: self.undelayed(&state.drive, state.seen.correction_rad_s),
         }
+    }
+}
+
+/// Forces with their phase put ahead by that of (`cos`, `sin`).
+#[inline(always)]
+fn ahead<T: Float>(f: &AxisForces<T>, cos: T, sin: T) -> AxisForces<T> {
+    AxisForces {
+        x_c: f.x_c * cos + f.x_s * sin,
+        x_s: f.x_s * cos - f.x_c * sin,
+        y_c: f.y_c * cos + f.y_s * sin,
+        y_s: f.y_s * cos - f.y_c * sin,
     }
 }
 

@@ -192,10 +192,10 @@ mod tests {
 
     #[test]
     fn intervals_hold_as_often_as_they_say() {
-        let held = |which: fn(&Temperature) -> Estimate, truth: f64| {
+        let held = |which: fn(&Temperature) -> Estimate, planted: f64| {
             let of = |seed: &usize| {
                 let e = which(&temperature(&campaign([2e-5, 1e-4], 1e-3, *seed), -1.0).unwrap());
-                e.ci95[0] <= truth && truth <= e.ci95[1]
+                e.ci95[0] <= planted && planted <= e.ci95[1]
             };
             (0..400).filter(of).count()
         };
@@ -249,10 +249,10 @@ mod tests {
             ratio: Some(1.04 + 3e-5 * t),
         };
         let found = temperature(&[seen(0.0), seen(20.0), seen(55.0), seen(70.0)], 1.0).unwrap();
-        for (e, truth) in
+        for (e, planted) in
             [(found.angular_gain_per_k, -1e-5), (found.bias_dps_per_k, 2e-3), (found.detection_gain_ratio_per_k, 3e-5)]
         {
-            assert!((e.unwrap().value / truth - 1.0).abs() < 1e-6, "{found:?}");
+            assert!((e.unwrap().value / planted - 1.0).abs() < 1e-6, "{found:?}");
         }
         assert!(temperature(&[seen(0.0), seen(20.0)], 1.0).unwrap().reason.unwrap().contains("three runs"));
     }
