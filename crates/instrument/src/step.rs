@@ -372,7 +372,8 @@ impl<T: Float> Instrument<T> {
     }
 
     /// The moment of the window, for readout effects that depend on it.
-    #[inline]
+    #[cold]
+    #[inline(never)]
     fn moment(&self, state: &State<T>) -> Moment<T> {
         Moment {
             // effects that are told by it, or by the temperature, are refused
