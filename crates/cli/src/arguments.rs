@@ -195,13 +195,17 @@ pub(crate) enum Command {
         /// Campaigns, folders with one or of such folders; patterns like 'devices/*/campaign.toml'
         #[arg(required = true, value_name = "CAMPAIGN")]
         campaigns: Vec<PathBuf>,
-        /// Folder for fleet.csv, fleet.json and a folder of results for each device; answers there that rest on the same
-        /// files are kept
+        /// Folder for fleet.html, fleet.csv, fleet.json and a folder of results for each device; answers there that rest on
+        /// the same files are kept
         #[arg(long)]
         out: PathBuf,
         /// Limits of numbers of each report (TOML); exit status 1 where a device fails one
         #[arg(long, value_name = "LIMITS")]
         limits: Option<PathBuf>,
+        /// Write fleet-prior.csv as well: each device's values with what the others say of them beforehand (empirical
+        /// Bayes); no report or calibration has it in it
+        #[arg(long)]
+        prior: bool,
         /// Print fleet.json and nothing else to standard output
         #[arg(long)]
         json: bool,

@@ -20,6 +20,7 @@ mod library;
 mod limits;
 mod output;
 mod paper;
+mod population;
 mod progress;
 mod report;
 mod self_calibration;
@@ -90,9 +91,9 @@ fn done(command: Command) -> Result<(), Failure> {
             let effects = commands::written(&effect)?;
             commands::identify(|| input::campaign(&campaign, &wanted), effects, out.as_deref(), json, limits.as_ref())
         }
-        Command::Fleet { campaigns, out, limits, json } => {
+        Command::Fleet { campaigns, out, limits, prior, json } => {
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
-            fleet::fleet(&campaigns, &out, limits.as_ref(), json)
+            fleet::fleet(&campaigns, &out, &fleet::Asked { limits: limits.as_ref(), json, prior })
         }
         Command::Compare { a, b, json } => compare::compare(&a, &b, json),
         Command::Compensate { calibration, recordings, out, device, mapping } => {

@@ -73,6 +73,15 @@ fn every_device_is_a_row_and_the_odd_one_is_named() {
     assert!(sheet.rows[0][low].parse::<f64>().unwrap() < sheet.rows[0][low + 1].parse().unwrap());
     assert!(outcome.stdout.contains("odd: unit-11"), "{}", outcome.stdout);
     assert!(outcome.stdout.contains("refused: "), "{}", outcome.stdout);
+
+    let page = fs::read_to_string(out.path().join("fleet.html")).unwrap();
+    for wanted in ["11 of 12 answered, 1 odd", "detection-cubic: gains", "an exception", "by serial number", "unit-03"]
+    {
+        assert!(page.contains(wanted), "{wanted}");
+    }
+    let line = &facts["quantities"]["detection_gain_ratio"];
+    assert!(line["control"]["upper"].as_f64() > line["centre"].as_f64(), "{line}");
+    assert_eq!(line["change"], Value::Null, "drawn alike from the first to the last");
 }
 
 #[test]
@@ -83,6 +92,16 @@ fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
     let alone =
         cvg(&[OsStr::new("identify"), folder.path().join("unit-02/campaign.toml").as_os_str(), OsStr::new("--json")]);
     assert_eq!(alone.stdout.trim_end(), fs::read_to_string(results(out.path(), 2)).unwrap());
+
+    // what the fleet says beforehand is asked for, states itself, and is in no report
+    let prior = out.path().join("fleet-prior.csv");
+    assert!(!prior.exists());
+    let before = fs::read(results(out.path(), 2)).unwrap();
+    let arguments = [folder.path().as_os_str(), OsStr::new("--out"), out.path().as_os_str(), OsStr::new("--prior")];
+    let asked = cvg(&[&[OsStr::new("fleet")], &arguments[..]].concat());
+    assert!(prior.exists() && asked.stdout.contains("fleet-prior.csv: a prior from the fleet"), "{}", asked.stdout);
+    assert!(facts(out.path())["prior"]["statement"].as_str().unwrap().contains("without it"));
+    assert_eq!(fs::read(results(out.path(), 2)).unwrap(), before);
 
     let written = |number: usize| fs::metadata(results(out.path(), number)).unwrap().modified().unwrap();
     let before = [written(1), written(2)];
@@ -95,6 +114,7 @@ fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
     assert!(written(1) > before[0], "what changed is identified anew");
     assert_eq!(written(2), before[1], "what did not is kept");
     assert_eq!(fs::read_to_string(out.path().join("fleet.csv")).unwrap(), first);
+    assert!(!prior.exists(), "it is of the answers before");
 }
 
 #[test]
@@ -108,4 +128,46 @@ fn a_fleet_without_an_answer_and_a_folder_without_a_campaign_say_so() {
     let none = fleet(folder.path(), out.path());
     assert_eq!(none.status, 1, "{}", none.stderr);
     assert_eq!(rows(out.path()).rows.len(), 1);
+}
+
+/// As many devices as `CVG_TRIALS` says, 40 without it, one in twenty odd by an effect or a gain of its own, all with the skew of a common
+/// board: the odd ones are found, hardly another is named, and the skew is the board's.
+#[test]
+fn of_many_devices_the_odd_ones_are_found_and_what_all_have_is_shared() {
+    let trials = std::env::var("CVG_TRIALS").ok().and_then(|text| text.parse::<usize>().ok());
+    let count = trials.unwrap_or(40);
+    let effect = |id, values| EffectSetting::new(id, values).unwrap();
+    let kinds = [
+        effect(EffectId::DetectionCubic, [0.01, 0.0, 0.0, 0.0]),
+        effect(EffectId::DetectionOffset, [5e-4, -3e-4, 0.0, 0.0]),
+        effect(EffectId::DetectionGainMismatch, [1.05, 0.0, 0.0, 0.0]),
+    ];
+    let is_odd = |number: usize| number % 20 == 11;
+    let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    for number in 0..count {
+        let mut settings = Scenario::parse(SMALL).unwrap().settings().clone();
+        settings.device = format!("unit-{number}");
+        settings.seed = 500 + number as u64;
+        // no two boards are alike
+        settings.angular_gain += 1e-4 * ((7 * number) % 11) as f64;
+        let skew = 2e-3 + 2e-5 * ((5 * number) % 13) as f64;
+        settings.effects.push(effect(EffectId::DetectionSkew, [skew, 0.0, 0.0, 0.0]));
+        if is_odd(number) {
+            let own = kinds[number / 20 % kinds.len()];
+            settings.effects.retain(|e| e.id != own.id);
+            settings.effects.push(own);
+        }
+        Scenario::new(settings).unwrap().simulate().write(folder.path().join(format!("unit-{number}"))).unwrap();
+    }
+    assert_eq!(fleet(folder.path(), out.path()).status, 0);
+    let facts = facts(out.path());
+    let named: Vec<&str> = facts["odd"].as_array().unwrap().iter().map(|o| o["device"].as_str().unwrap()).collect();
+    let planted: Vec<String> = (0..count).filter(|n| is_odd(*n)).map(|n| format!("unit-{n}")).collect();
+    let missed: Vec<&String> = planted.iter().filter(|p| !named.contains(&p.as_str())).collect();
+    let others: Vec<&&str> = named.iter().filter(|n| !planted.iter().any(|p| p == **n)).collect();
+    println!("{count} devices, {} odd: missed {missed:?}, named falsely {others:?}", planted.len());
+    assert!(20 * missed.len() <= planted.len(), "{missed:?}");
+    assert!(100 * others.len() <= count, "{others:?}");
+    let skew = facts["effects"].as_array().unwrap().iter().find(|e| e["id"] == "detection-skew").unwrap();
+    assert_eq!(skew["shared"], true);
 }

@@ -5,6 +5,7 @@
 
 mod figures;
 mod finding;
+pub(crate) mod fleet;
 pub(crate) mod further;
 pub(crate) mod survey;
 mod tables;
