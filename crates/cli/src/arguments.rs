@@ -192,10 +192,11 @@ pub(crate) enum Command {
     },
     /// Identify many devices in one call: a row for each, and what is odd or shared among them
     Fleet {
-        /// Campaigns, folders with one or of such folders; patterns like 'devices/*/campaign.toml'
+        /// Campaigns, folders with one or of such folders, patterns like 'devices/*/campaign.toml'; or Parquet with a column
+        /// `device`, one file or a folder of them
         #[arg(required = true, value_name = "CAMPAIGN")]
         campaigns: Vec<PathBuf>,
-        /// Folder for fleet.html, fleet.csv, fleet.json and a folder of results for each device; answers there that rest on
+        /// Folder for fleet.html, fleet.csv, fleet.parquet, fleet.json and a folder of results for each device; answers there that rest on
         /// the same files are kept
         #[arg(long)]
         out: PathBuf,

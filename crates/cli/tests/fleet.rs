@@ -7,6 +7,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use cvg_calibration::recording::{Campaign, Cells, Channel, Lake, RunKind, Values, write_parquet};
 use cvg_model::effects::EffectId;
 use cvg_simulator::scenario::EffectSetting;
 use cvg_simulator::{Scenario, Settings};
@@ -41,7 +42,7 @@ fn rows(out: &Path) -> Sheet {
     Sheet::of(&fs::read_to_string(out.join("fleet.csv")).unwrap())
 }
 
-fn results(out: &Path, number: usize) -> PathBuf {
+fn results_of(out: &Path, number: usize) -> PathBuf {
     out.join(format!("unit-{number:02}")).join("report.json")
 }
 
@@ -91,19 +92,19 @@ fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
     assert_eq!(fleet(folder.path(), out.path()).status, 0);
     let alone =
         cvg(&[OsStr::new("identify"), folder.path().join("unit-02/campaign.toml").as_os_str(), OsStr::new("--json")]);
-    assert_eq!(alone.stdout.trim_end(), fs::read_to_string(results(out.path(), 2)).unwrap());
+    assert_eq!(alone.stdout.trim_end(), fs::read_to_string(results_of(out.path(), 2)).unwrap());
 
     // what the fleet says beforehand is asked for, states itself, and is in no report
     let prior = out.path().join("fleet-prior.csv");
     assert!(!prior.exists());
-    let before = fs::read(results(out.path(), 2)).unwrap();
+    let before = fs::read(results_of(out.path(), 2)).unwrap();
     let arguments = [folder.path().as_os_str(), OsStr::new("--out"), out.path().as_os_str(), OsStr::new("--prior")];
     let asked = cvg(&[&[OsStr::new("fleet")], &arguments[..]].concat());
     assert!(prior.exists() && asked.stdout.contains("fleet-prior.csv: a prior from the fleet"), "{}", asked.stdout);
     assert!(facts(out.path())["prior"]["statement"].as_str().unwrap().contains("without it"));
-    assert_eq!(fs::read(results(out.path(), 2)).unwrap(), before);
+    assert_eq!(fs::read(results_of(out.path(), 2)).unwrap(), before);
 
-    let written = |number: usize| fs::metadata(results(out.path(), number)).unwrap().modified().unwrap();
+    let written = |number: usize| fs::metadata(results_of(out.path(), number)).unwrap().modified().unwrap();
     let before = [written(1), written(2)];
     let first = fs::read_to_string(out.path().join("fleet.csv")).unwrap();
     // a device is measured again
@@ -170,4 +171,106 @@ fn of_many_devices_the_odd_ones_are_found_and_what_all_have_is_shared() {
     assert!(100 * others.len() <= count, "{others:?}");
     let skew = facts["effects"].as_array().unwrap().iter().find(|e| e["id"] == "detection-skew").unwrap();
     assert_eq!(skew["shared"], true);
+}
+
+/// Rows of some devices as one table, and what a campaign file says of them in columns.
+fn rows_of(folder: &Path, numbers: &[usize]) -> Vec<(String, Values)> {
+    let channels = ["t_s", "rate_dps", "xc_v", "xs_v", "yc_v", "ys_v", "vas_v", "vqc_v"];
+    let settings = ["settle_s", "angle_deg", "energy_off_s"];
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); channels.len() + settings.len()];
+    let mut words: [Cells; 4] = Default::default();
+    for number in numbers {
+        let campaign = Campaign::open(&folder.join(format!("unit-{number:02}/campaign.toml"))).unwrap();
+        for run in &campaign.runs {
+            let rows = run.recording.len();
+            let (kind, said) = match run.kind {
+                RunKind::Ringdown { angle_deg, energy_off_s, .. } => ("ringdown", [angle_deg, energy_off_s]),
+                _ => ("rotation", [f64::NAN; 2]),
+            };
+            let held = if run.role == cvg_calibration::recording::Role::Holdout { "holdout" } else { "" };
+            for row in 0..rows {
+                for (to, name) in values.iter_mut().zip(channels) {
+                    let channel = Channel::of(name).unwrap();
+                    to.push(run.recording.channel(channel).map_or(f64::NAN, |v| v[row]));
+                }
+                let settle_s = if kind == "rotation" { run.settle_s } else { f64::NAN };
+                values[channels.len()..].iter_mut().zip([settle_s, said[0], said[1]]).for_each(|(to, v)| to.push(v));
+                let file = run.file.display().to_string();
+                words.iter_mut().zip([campaign.device.as_str(), &file, kind, held]).for_each(|(to, v)| to.push(v));
+            }
+        }
+    }
+    let numbers = channels.into_iter().chain(settings).zip(values).map(|(n, v)| (n.to_owned(), Values::Numbers(v)));
+    let texts = ["device", "run", "kind", "use"].into_iter().zip(words).map(|(n, v)| (n.to_owned(), Values::Texts(v)));
+    texts.chain(numbers).collect()
+}
+
+fn part(columns: &[(String, Values)], rows: std::ops::Range<usize>) -> Vec<u8> {
+    let cut = |values: &Values| match values {
+        Values::Numbers(v) => Values::Numbers(v[rows.clone()].to_vec()),
+        Values::Texts(cells) => Values::Texts(rows.clone().map(|row| cells.get(row).unwrap().to_owned()).collect()),
+    };
+    let columns: Vec<(String, Values)> = columns.iter().map(|(name, v)| (name.clone(), cut(v))).collect();
+    let mut out = Vec::new();
+    write_parquet(&columns, &mut out).unwrap();
+    out
+}
+
+#[test]
+fn a_lake_is_answered_as_the_campaigns_in_it_are_and_goes_on_where_it_was_broken_off() {
+    let [folder, lake, of_files, of_lake] = [(); 4].map(|()| TempDir::new().unwrap());
+    devices(folder.path());
+    let columns = rows_of(folder.path(), &[0, 1, 2]);
+    let Values::Numbers(times) = &columns[4].1 else { panic!("no times") };
+    // the second device goes on in the second file
+    let (all, middle) = (times.len(), times.len() / 2);
+    fs::write(lake.path().join("a.parquet"), part(&columns, 0..middle)).unwrap();
+    fs::write(lake.path().join("b.parquet"), part(&columns, middle..all)).unwrap();
+    let outcome = fleet(lake.path(), of_lake.path());
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    for number in 3..DEVICES {
+        fs::remove_dir_all(folder.path().join(format!("unit-{number:02}"))).unwrap();
+    }
+    assert_eq!(fleet(folder.path(), of_files.path()).status, 0);
+    let (expected, found) = (rows(of_files.path()), rows(of_lake.path()));
+    assert_eq!(found.header, expected.header);
+    for (found, expected) in found.rows.iter().zip(&expected.rows) {
+        // but for where it is from
+        assert_eq!((&found[0], &found[2..]), (&expected[0], &expected[2..]));
+    }
+    let results = Lake::open(&of_lake.path().join("fleet.parquet")).unwrap().unwrap();
+    assert_eq!(results.devices().collect::<Vec<_>>(), ["unit-00", "unit-01", "unit-02"]);
+
+    // a row of the first device changes
+    let written = |number: usize| fs::metadata(results_of(of_lake.path(), number)).unwrap().modified().unwrap();
+    let before = [written(0), written(2)];
+    let mut changed = columns;
+    let Values::Numbers(vas) = &mut changed[10].1 else { panic!("no numbers") };
+    vas[7] += 1e-9;
+    fs::write(lake.path().join("a.parquet"), part(&changed, 0..middle)).unwrap();
+    assert_eq!(fleet(lake.path(), of_lake.path()).status, 0);
+    assert!(written(0) > before[0], "what changed is identified anew");
+    assert_eq!(written(2), before[1], "what did not is kept");
+}
+
+#[test]
+fn a_lake_that_cannot_be_meant_says_why() {
+    let (lake, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let file = lake.path().join("lake.parquet");
+    fs::write(&file, b"PAR1 and no more").unwrap();
+    let damaged = fleet(&file, out.path());
+    assert!(damaged.status == 2 && damaged.stderr.contains("lake.parquet"), "{}", damaged.stderr);
+    // two values of what a device has one of: a row that says so
+    let cells = |texts: [&str; 2]| Values::Texts(texts.into_iter().map(str::to_owned).collect());
+    let columns = [
+        ("device".to_owned(), cells(["a", "a"])),
+        ("t_s".to_owned(), Values::Numbers(vec![0.0, 1.0])),
+        ("instrument".to_owned(), cells(["gyroscope", "sensor"])),
+    ];
+    let mut bytes = Vec::new();
+    write_parquet(&columns, &mut bytes).unwrap();
+    fs::write(&file, bytes).unwrap();
+    let outcome = fleet(lake.path(), out.path());
+    assert_eq!(outcome.status, 1, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("`instrument` is gyroscope and sensor"), "{}", outcome.stdout);
 }

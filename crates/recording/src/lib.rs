@@ -36,6 +36,8 @@ pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};
 pub use memory::{limit_memory, memory_limit, panic_is_answer};
 pub use naming::Naming;
+#[cfg(feature = "parquet")]
+pub use parquet::{Lake, write_parquet};
 pub use unknown::{Cells, UnknownColumn};
 
 /// One recording: columns of equal length, one value a row.

@@ -1,41 +1,61 @@
-//! fleet.csv: a row for each device.
+//! fleet.csv and fleet.parquet: a row for each device; fleet-prior.csv: one for each of its quantities.
 
 use std::fmt::Write as _;
 
+use cvg_calibration::recording::{Cells, Values};
+
 use crate::population::prior::Posterior;
 use crate::population::{Device, Oddity, Population};
+use crate::service::Columns;
 
-/// The table of all devices.
-pub(super) fn table(population: &Population, devices: &[Device]) -> String {
-    let names: Vec<&String> = population.distributions.keys().collect();
-    let mut out = String::from(
-        "device,campaign,folder,status,reason,raw_rms_deg,declared_rms_deg,discovered_rms_deg,noise_floor_deg,effects,odd,\
-         outside_limits",
-    );
-    for name in &names {
-        let _ = write!(out, ",{0},{0}.low,{0}.high", quoted(name));
+/// A row for each device, as columns.
+pub(super) fn columns(population: &Population, devices: &[Device]) -> Columns {
+    let texts = |name: &str, of: &dyn Fn(usize) -> String| {
+        (name.to_owned(), Values::Texts((0..devices.len()).map(of).collect::<Cells>()))
+    };
+    let numbers = |name: &str, of: &dyn Fn(usize) -> Option<f64>| {
+        let values = (0..devices.len()).map(|at| of(at).unwrap_or(f64::NAN));
+        (name.to_owned(), Values::Numbers(values.collect()))
+    };
+    let mut out = vec![
+        texts("device", &|at| devices[at].text("device").to_owned()),
+        texts("campaign", &|at| devices[at].campaign.display().to_string()),
+        texts("folder", &|at| devices[at].folder.clone()),
+        texts("status", &|at| devices[at].text("status").to_owned()),
+        texts("reason", &|at| devices[at].text("reason").to_owned()),
+    ];
+    for stage in ["raw", "declared", "discovered"] {
+        out.push(numbers(&format!("{stage}_rms_deg"), &|at| devices[at].number(&format!("/heldout/{stage}/rms_deg"))));
     }
-    out.push('\n');
-    for ((device, parameters), odd) in devices.iter().zip(&population.parameters).zip(&population.odd) {
-        let effects: Vec<String> = device.effects().into_iter().map(|f| f.label).collect();
-        let odd: Vec<String> = odd.iter().map(Oddity::name).collect();
-        let mut cells = vec![
-            quoted(device.text("device")),
-            quoted(&device.campaign.display().to_string()),
-            quoted(&device.folder),
-            device.text("status").to_owned(),
-            quoted(device.text("reason")),
-        ];
-        let errors = ["raw/rms_deg", "declared/rms_deg", "discovered/rms_deg", "noise_floor_deg"];
-        cells.extend(errors.map(|stage| number(device.number(&format!("/heldout/{stage}")))));
-        cells.extend([quoted(&effects.join(" ")), quoted(&odd.join(" "))]);
-        cells.push(quoted(device.outside.as_deref().unwrap_or_default()));
-        for name in &names {
-            let p = parameters.iter().find(|p| p.name == **name);
-            let ends = p.and_then(|p| p.ci95);
-            cells.extend([p.map(|p| p.value), ends.map(|e| e[0]), ends.map(|e| e[1])].map(number));
-        }
-        let _ = writeln!(out, "{}", cells.join(","));
+    out.push(numbers("noise_floor_deg", &|at| devices[at].number("/heldout/noise_floor_deg")));
+    let joined = |names: Vec<String>| names.join(" ");
+    out.push(texts("effects", &|at| joined(devices[at].effects().into_iter().map(|f| f.label).collect())));
+    out.push(texts("odd", &|at| joined(population.odd[at].iter().map(Oddity::name).collect())));
+    out.push(texts("outside_limits", &|at| devices[at].outside.clone().unwrap_or_default()));
+    for name in population.distributions.keys() {
+        let of = |at: usize| population.parameters[at].iter().find(|p| p.name == *name);
+        let end = |at: usize, end: usize| of(at).and_then(|p| p.ci95).map(|ends| ends[end]);
+        out.push(numbers(name, &|at| of(at).map(|p| p.value)));
+        out.push(numbers(&format!("{name}.low"), &|at| end(at, 0)));
+        out.push(numbers(&format!("{name}.high"), &|at| end(at, 1)));
+    }
+    out
+}
+
+/// The same as fleet.csv.
+pub(super) fn csv(columns: &Columns) -> String {
+    let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
+    let mut out = names.join(",") + "\n";
+    let rows = columns.first().map_or(0, |(_, values)| match values {
+        Values::Numbers(numbers) => numbers.len(),
+        Values::Texts(cells) => cells.len(),
+    });
+    for row in 0..rows {
+        let cell = |(_, values): &(String, Values)| match values {
+            Values::Numbers(numbers) => number(Some(numbers[row])),
+            Values::Texts(cells) => quoted(cells.get(row).unwrap_or_default()),
+        };
+        let _ = writeln!(out, "{}", columns.iter().map(cell).collect::<Vec<_>>().join(","));
     }
     out
 }
@@ -61,11 +81,11 @@ pub(super) fn prior(posteriors: &[Posterior], devices: &[Device]) -> String {
 }
 
 /// A number as a cell: empty where there is none.
-pub(super) fn number(value: Option<f64>) -> String {
+fn number(value: Option<f64>) -> String {
     value.filter(|v| v.is_finite()).map_or(String::new(), |v| v.to_string())
 }
 
 /// A text as a cell (RFC 4180).
-pub(super) fn quoted(text: &str) -> String {
+fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }

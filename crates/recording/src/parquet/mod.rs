@@ -3,6 +3,8 @@
 //! Uncompressed, Snappy, gzip, LZ4 and Brotli are understood; Zstandard and LZO are refused by name.
 
 #[cfg(feature = "parquet")]
+mod lake;
+#[cfg(feature = "parquet")]
 mod read;
 #[cfg(feature = "parquet")]
 mod sizes;
@@ -10,7 +12,11 @@ mod sizes;
 mod write;
 
 #[cfg(feature = "parquet")]
+pub use lake::Lake;
+#[cfg(feature = "parquet")]
 pub(super) use read::read;
+#[cfg(feature = "parquet")]
+pub use write::write_parquet;
 
 /// In the place of the reader where it is not built in.
 #[cfg(not(feature = "parquet"))]

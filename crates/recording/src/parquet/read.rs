@@ -4,6 +4,7 @@
 //! wanted, and left out with a warning where nothing is.
 
 use std::fs::File;
+use std::ops::Range;
 use std::path::Path;
 
 use parquet::basic::{Compression, LogicalType};
@@ -68,7 +69,7 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     table.warnings = warnings;
     refuse_codecs(&reader, &kept, source)?;
     let is_text: Vec<bool> = layout.fields.iter().map(|field| matches!(field, Field::Text(_))).collect();
-    sizes::check(reader.metadata(), &kept, &is_text, pages, source)?;
+    sizes::check(reader.metadata().row_groups(), &kept, &is_text, pages, source)?;
 
     // One after the other: readers of one file share its position.
     let columns: Vec<Column> = kept
@@ -76,7 +77,7 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
         .zip(&layout.fields)
         .map(|(&at, field)| {
             let is_time = matches!(field, Field::Number(at) if layout.channels[*at] == Channel::Time);
-            read_column(&reader, at, *field, is_time)
+            read_column(&reader, 0..reader.num_row_groups(), at, *field, is_time)
         })
         .collect::<Result<_, ParquetError>>()
         .map_err(|error| refuse(error.to_string()))?;
@@ -116,7 +117,7 @@ fn tick_s(description: &ColumnDescPtr) -> Option<f64> {
 }
 
 /// Why a column cannot be read, if it cannot.
-fn unreadable(description: &ColumnDescPtr, is_channel: bool) -> Option<String> {
+pub(super) fn unreadable(description: &ColumnDescPtr, is_channel: bool) -> Option<String> {
     use parquet::basic::Type;
     if description.path().parts().len() > 1 || description.max_rep_level() > 0 {
         return Some("is nested or repeated".to_owned());
@@ -132,7 +133,11 @@ fn unreadable(description: &ColumnDescPtr, is_channel: bool) -> Option<String> {
     (!is_readable).then(|| format!("is of the type {physical}"))
 }
 
-fn refuse_codecs(reader: &SerializedFileReader<File>, kept: &[usize], source: &Path) -> Result<(), ReadError> {
+pub(super) fn refuse_codecs(
+    reader: &SerializedFileReader<File>,
+    kept: &[usize],
+    source: &Path,
+) -> Result<(), ReadError> {
     for group in reader.metadata().row_groups() {
         for chunk in kept.iter().filter_map(|&at| group.columns().get(at)) {
             let codec = chunk.compression();
@@ -149,7 +154,7 @@ fn refuse_codecs(reader: &SerializedFileReader<File>, kept: &[usize], source: &P
     Ok(())
 }
 
-enum Column {
+pub(super) enum Column {
     Numbers(Vec<f64>, Missing),
     Texts(Cells),
 }
@@ -173,8 +178,10 @@ impl Column {
     }
 }
 
-fn read_column(
+/// Reads a column of these row groups.
+pub(super) fn read_column(
     reader: &SerializedFileReader<File>,
+    groups: Range<usize>,
     at: usize,
     field: Field,
     is_time: bool,
@@ -185,7 +192,7 @@ fn read_column(
         Field::Number(_) => Column::Numbers(vec![], Missing::default()),
         Field::Text(_) => Column::Texts(Cells::default()),
     };
-    for group in 0..reader.num_row_groups() {
+    for group in groups {
         let group = reader.get_row_group(group)?;
         let most = column.len() + usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         let description = group.metadata().column(at).column_descr_ptr();

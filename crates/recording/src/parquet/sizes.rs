@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
 
 use crate::error::ReadError;
 use crate::memory::{self, PER_NUMBER, PER_TEXT};
@@ -19,7 +19,7 @@ const DEEPEST: usize = 8;
 
 /// Refuses columns that would take too much, and pages that contradict their columns.
 pub(super) fn check(
-    metadata: &ParquetMetaData,
+    groups: &[RowGroupMetaData],
     kept: &[usize],
     is_text: &[bool],
     mut file: File,
@@ -28,7 +28,7 @@ pub(super) fn check(
     let length = file.metadata().map_err(|error| ReadError::io(source, error))?.len();
     let damaged = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
     let mut needed = 0_u64;
-    for group in metadata.row_groups() {
+    for group in groups {
         let rows = u64::try_from(group.num_rows()).map_err(|_| damaged("the file is damaged".into()))?;
         let mut chunk_bytes = 0;
         for (&at, &is_text) in kept.iter().zip(is_text) {
@@ -42,7 +42,7 @@ pub(super) fn check(
         needed = needed.saturating_add(chunk_bytes.saturating_mul(2));
     }
     memory::allow(needed, "its columns", source)?;
-    for group in metadata.row_groups() {
+    for group in groups {
         for chunk in kept.iter().filter_map(|&at| group.columns().get(at)) {
             pages(chunk, group.num_rows(), &mut file, length)
                 .map_err(|what| damaged(format!("column `{}`: {what}", chunk.column_path().string())))?;

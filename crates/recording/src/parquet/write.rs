@@ -12,7 +12,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use crate::{Cells, Outlet, Recording};
+use crate::{Cells, Outlet, Recording, Values};
 
 impl Recording {
     /// Writes the recording as Parquet, in the order of its columns.
@@ -23,6 +23,24 @@ impl Recording {
         let outlets = self.even_outlets()?;
         write(&outlets, writer).map_err(io::Error::other)
     }
+}
+
+/// Writes columns of one length as Parquet, in their order: of results, say.
+///
+/// # Errors
+/// What the writer says, or [`io::ErrorKind::InvalidInput`] for columns that differ in length.
+pub fn write_parquet(columns: &[(String, Values)], writer: impl Write + Send) -> io::Result<()> {
+    let outlets: Vec<(&str, Outlet<'_>)> = columns
+        .iter()
+        .map(|(name, values)| match values {
+            Values::Numbers(numbers) => (name.as_str(), Outlet::Numbers(numbers)),
+            Values::Texts(cells) => (name.as_str(), Outlet::Texts(cells)),
+        })
+        .collect();
+    if outlets.windows(2).any(|w| w[0].1.len() != w[1].1.len()) {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the columns differ in length"));
+    }
+    write(&outlets, writer).map_err(io::Error::other)
 }
 
 fn write(outlets: &[(&str, Outlet<'_>)], writer: impl Write + Send) -> Result<(), ParquetError> {

@@ -1,0 +1,216 @@
+//! The devices of a fleet, each identified into a folder of its own: from campaigns on disk, and from lakes.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::Options;
+use cvg_calibration::recording::{Campaign, Lake, Naming};
+use cvg_calibration::report::refused::About;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::lake::{self, Member};
+use crate::commands::{RESULTS, Told};
+use crate::input::{Wanted, campaign, explained, files};
+use crate::limits::Limits;
+use crate::population::Device;
+use crate::{Failure, output};
+
+/// What the folder of a device of a lake has of the rows that its answer rests on.
+const SOURCE: &str = "source.json";
+
+/// Where devices are.
+pub(super) enum Source {
+    /// one, in a campaign or a recording
+    File(PathBuf),
+    /// many, in Parquet with a column `device`
+    Lake(Lake),
+}
+
+impl Source {
+    pub(super) fn path(&self) -> &Path {
+        match self {
+            Self::File(path) => path,
+            Self::Lake(lake) => lake.path(),
+        }
+    }
+
+    /// How many devices.
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::File(_) => 1,
+            Self::Lake(lake) => lake.devices().count(),
+        }
+    }
+}
+
+/// What is behind names, patterns and folders; of a folder without a campaign, those of the folders in it, or a lake.
+pub(super) fn sources(names: &[PathBuf]) -> Result<Vec<Source>, Failure> {
+    let mut out = Vec::new();
+    for path in files(names)? {
+        if !path.is_dir() {
+            let lake = if path.is_file() { Lake::open(&path).map_err(explained)? } else { None };
+            out.push(lake.map_or_else(|| Source::File(path), Source::Lake));
+            continue;
+        }
+        let entries = std::fs::read_dir(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        let mut inner: Vec<PathBuf> =
+            entries.flatten().map(|e| e.path().join("campaign.toml")).filter(|p| p.is_file()).collect();
+        inner.sort();
+        if !inner.is_empty() {
+            out.extend(inner.into_iter().map(Source::File));
+        } else if let Some(lake) = Lake::open(&path).map_err(explained)? {
+            out.push(Source::Lake(lake));
+        } else {
+            let wanted = "and no Parquet file with a column `device`";
+            let what = format!("{}: there is no campaign.toml in it or in its folders, {wanted}", path.display());
+            return Err(Failure::input(what));
+        }
+    }
+    Ok(out)
+}
+
+/// Identifies the devices, or takes the answers that are there.
+pub(super) fn answered(sources: Vec<Source>, out: &Path, limits: Option<&Limits>) -> Result<Vec<Device>, Failure> {
+    let mut folders = Folders::default();
+    let (mut files, mut lakes) = (Vec::new(), Vec::new());
+    for source in sources {
+        match source {
+            Source::File(path) => files.push((folders.of_file(&path), path)),
+            Source::Lake(lake) => lakes.push(lake),
+        }
+    }
+    let of_file = |(folder, path): (String, PathBuf)| {
+        let naming = Naming::default();
+        let wanted = Wanted { naming: &naming, holdout: &[], settle_s: None, sensor: false };
+        let opened = campaign(std::slice::from_ref(&path), &wanted);
+        device(opened, None, Place { folder: folder.clone(), name: folder, path, out }, limits)
+    };
+    let mut all: Vec<Device> = files.into_par_iter().map(of_file).collect::<Result<_, _>>()?;
+    for lake in &lakes {
+        lake::each(lake, |members| {
+            let placed: Vec<(String, Member)> = members.into_iter().map(|m| (folders.of_name(&m.name), m)).collect();
+            let of_member = |(folder, member): (String, Member)| {
+                let (name, source) = (member.name.clone(), member.source(lake.path()));
+                let place = Place { folder, name, path: lake.path().to_path_buf(), out };
+                device(member.campaign(), Some(&source), place, limits)
+            };
+            all.extend(placed.into_par_iter().map(of_member).collect::<Result<Vec<_>, _>>()?);
+            Ok(())
+        })?;
+    }
+    Ok(all)
+}
+
+/// Folders of results, no two alike.
+#[derive(Default)]
+struct Folders(BTreeSet<String>);
+
+impl Folders {
+    /// The name of the campaign's own folder, or of its file.
+    fn of_file(&mut self, path: &Path) -> String {
+        let named = path.file_stem().filter(|s| *s != "campaign").or_else(|| path.parent()?.file_name());
+        self.free(named.map_or("device".into(), |n| n.to_string_lossy().into_owned()))
+    }
+
+    /// A device's name, as far as it is no way through folders.
+    fn of_name(&mut self, name: &str) -> String {
+        let kept = |c: char| if c.is_alphanumeric() || "-_+. ".contains(c) { c } else { '_' };
+        let text: String = name.chars().map(kept).collect();
+        let text = text.trim_start_matches('.').trim();
+        self.free(if text.is_empty() { "device".to_owned() } else { text.to_owned() })
+    }
+
+    /// The name, numbered where another has it.
+    fn free(&mut self, name: String) -> String {
+        let numbered = (2..).map(|again| format!("{name}-{again}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|name| self.0.insert(name.clone()));
+        free.unwrap_or(name)
+    }
+}
+
+/// Where a device comes from and where its results go.
+struct Place<'a> {
+    folder: String,
+    name: String,
+    path: PathBuf,
+    out: &'a Path,
+}
+
+/// Identifies one device, or takes the answer that is there; `source` says which rows of a lake it is.
+fn device(
+    opened: Result<Campaign, Failure>,
+    source: Option<&str>,
+    place: Place<'_>,
+    limits: Option<&Limits>,
+) -> Result<Device, Failure> {
+    let own = place.out.join(&place.folder);
+    let report = match opened {
+        Ok(opened) => match kept(&own, &opened, source) {
+            Some(report) => report,
+            None => identified(opened, &own, source)?,
+        },
+        // a device that cannot be read is a row as well
+        Err(failure) => json!({"device": place.name, "status": "refused", "reason": failure.message}),
+    };
+    let name = report["device"].as_str().unwrap_or_default().to_owned();
+    let outside = match limits {
+        Some(_) if report["schema"].is_null() => Some("it cannot be read".into()),
+        Some(limits) => limits.judge(&name, &report)?,
+        None => None,
+    };
+    Ok(Device::new(place.folder, place.path, report, outside))
+}
+
+/// The report that is there, where it rests on the same bytes and this very program.
+fn kept(own: &Path, campaign: &Campaign, source: Option<&str>) -> Option<Value> {
+    let [file, ..] = RESULTS;
+    let text = std::fs::read_to_string(own.join(file)).ok()?;
+    let report: Value = serde_json::from_str(&text).ok()?;
+    let inputs = serde_json::to_value(cvg_calibration::report::inputs(campaign)).ok()?;
+    let tool = serde_json::to_value(cvg_calibration::report::Tool::default()).ok()?;
+    let same_rows = std::fs::read_to_string(own.join(SOURCE)).ok().as_deref() == source;
+    (report["inputs"] == inputs && report["tool"] == tool && same_rows).then_some(report)
+}
+
+/// Identifies a campaign, and writes what `cvg identify` writes of it but for the page.
+fn identified(opened: Campaign, own: &Path, source: Option<&str>) -> Result<Value, Failure> {
+    let inputs = crate::input::sources(&opened);
+    let [report, _, calibration] = RESULTS;
+    let about = About::campaign(&opened);
+    let (text, undone) = match cvg_calibration::answer(opened, &Options::default()) {
+        Ok(answer) => Told::facts(&answer)?,
+        Err(refusal) => (serde_json::to_string_pretty(&about.refused(&refusal)).map_err(Failure::input)?, None),
+    };
+    let mut set = output::Set::begin(own, &inputs)?;
+    set.add(report, text.as_bytes())?;
+    for (name, text) in [(calibration, undone.as_deref()), (SOURCE, source)] {
+        match text {
+            Some(text) => set.add(name, text.as_bytes())?,
+            None => set.take_away(&[name]),
+        }
+    }
+    set.commit()?;
+    serde_json::from_str(&text).map_err(Failure::input)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_campaigns_share_a_folder_of_results() {
+        let paths =
+            ["a/unit/campaign.toml", "b/unit/campaign.toml", "c/unit-2/campaign.toml", "unit.toml", "unit-2.toml"];
+        let mut folders = Folders::default();
+        let names = paths.map(|path| folders.of_file(Path::new(path)));
+        assert_eq!(names, ["unit", "unit-2", "unit-2-2", "unit-3", "unit-2-3"]);
+    }
+
+    #[test]
+    fn a_device_of_a_lake_has_a_folder_within_the_results_whatever_its_name() {
+        let mut folders = Folders::default();
+        let names = ["../../etc", "..", "a/b", "SN 07.1", ""].map(|name| folders.of_name(name));
+        assert_eq!(names, ["_.._etc", "device", "a_b", "SN 07.1", "device-2"]);
+    }
+}
