@@ -225,7 +225,21 @@ pub enum Inverse<T> {
 }
 
 /// An effect: its description and its forward definition in the stage where it acts.
-pub trait Effect {
+///
+/// Only what stands in the list at the end of this file is one, so that the trait can grow; an effect outside the library is
+/// written down as text.
+///
+/// ```compile_fail,E0277
+/// use cvg_model::effects::detection_skew::DetectionSkew;
+/// use cvg_model::effects::{Description, Effect};
+///
+/// struct OfSomebodyElse;
+///
+/// impl Effect for OfSomebodyElse {
+///     const DESCRIPTION: Description = DetectionSkew::DESCRIPTION;
+/// }
+/// ```
+pub trait Effect: listed::Listed {
     /// What is known of it.
     const DESCRIPTION: Description;
 
@@ -308,6 +322,12 @@ const fn located(name: &'static str, unit: &'static str, lower: f64, upper: f64,
     Parameter { role: Role::Located(over), ..searched(name, unit, lower, upper, over) }
 }
 
+/// Nobody else can name it.
+mod listed {
+    /// Stands in the list.
+    pub trait Listed {}
+}
+
 macro_rules! library {
     ($($name:ident => $effect:path),+ $(,)?) => {
         /// An effect of the library, which grows.
@@ -323,6 +343,8 @@ macro_rules! library {
             #[cfg(feature = "written")]
             Written(&'static written::Written),
         }
+
+        $(impl listed::Listed for $effect {})+
 
         impl EffectId {
             /// Every effect; readout effects in the order in which a signal meets them.
