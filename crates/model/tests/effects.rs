@@ -4,8 +4,8 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use approx::assert_abs_diff_eq;
 use cvg_model::effects::harmonic_n::factor;
-use cvg_model::effects::{Description, Effect, EffectId, Inverse, Moment, Role, Scaling, Search, Stage, Values};
-use cvg_model::{AxisForces, Envelope, Orbit, Real};
+use cvg_model::effects::{Description, EffectId, Inverse, Moment, Role, Search, Stage, Values};
+use cvg_model::{AxisForces, Envelope, Orbit};
 
 const VIBRATION: Envelope<f64> = Envelope { x_c: 0.6, x_s: -0.2, y_c: 0.5, y_s: 0.3 };
 
@@ -267,41 +267,6 @@ fn an_effect_scales_with_rate_and_amplitude_as_its_definition_does() {
             Stage::Input | Stage::Readout => assert_eq!(scaling.rate, 0, "{id}"),
         }
     }
-}
-
-/// An effect that leaves its inverse to the trait: Y sees a part of X's square.
-struct Bent;
-
-impl Effect for Bent {
-    const DESCRIPTION: Description = Description {
-        id: "bent",
-        title: "bent axes",
-        stage: Stage::Readout,
-        declared: false,
-        empirical: false,
-        in_sensors: false,
-        parameters: &[],
-        onsets: &[],
-        shown: &[],
-        signature: "none",
-        scaling: Scaling { rate: 0, amplitude: 1, odd_in_rate: false },
-        source: "this test",
-    };
-
-    fn read<T: Real>(&[bend, ..]: &Values<T>, e: Envelope<T>, _: &Moment<T>) -> Envelope<T> {
-        Envelope::new(e.x_c + bend * e.y_c * e.y_c, e.x_s, e.y_c + bend * e.x_c * e.x_c, e.y_s)
-    }
-}
-
-#[test]
-fn an_effect_without_an_inverse_of_its_own_is_undone_step_by_step() {
-    let bend = [0.02, 0.0, 0.0, 0.0];
-    let back = Bent::unread(&bend, Bent::read(&bend, VIBRATION, &now()), &now());
-    // each of eight steps leaves a fiftieth
-    assert!((back - VIBRATION).pendulum().e.sqrt() < 1e-13, "{back:?}");
-    // what it doesn't act on it leaves
-    assert_eq!(Bent::mechanics(&bend, &VIBRATION), Envelope::zero());
-    assert_eq!(Bent::input_rate(&bend, 3.0, &now()), 3.0);
 }
 
 #[test]

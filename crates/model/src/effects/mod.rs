@@ -31,6 +31,8 @@ pub mod scale_drift;
 pub mod spring_cubic;
 pub mod table_harmonic;
 pub mod temperature;
+#[cfg(test)]
+mod tests;
 pub mod time_periodic;
 #[cfg(feature = "written")]
 pub mod written;
