@@ -153,10 +153,12 @@ impl<'a> Selection<'a> {
         }
         let mut all = vec![Motion::None];
         // one way only, a constant that changes sign with the direction is a constant
-        if rates.iter().any(|r| *r > VARYING_RATE * fastest) && rates.iter().any(|r| *r < -VARYING_RATE * fastest) {
+        let both =
+            rates.iter().any(|r| *r > VARYING_RATE * fastest) && rates.iter().any(|r| *r < -VARYING_RATE * fastest);
+        if both {
             all.push(Motion::Direction);
         }
-        if !speed_is_one(&rates, fastest) {
+        if !both || !speed_is_one(&rates, fastest) {
             all.extend([Motion::Rate, Motion::RateAndAcceleration]);
         }
         let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));

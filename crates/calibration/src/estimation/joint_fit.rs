@@ -301,6 +301,19 @@ impl Dataset {
         }
     }
 
+    /// A split that is not yet fitted begins where the quadrature balance sees it: from zero, a large one under a fast
+    /// rotation lies beyond other minima.
+    fn begin_with_the_balance(&self, hypothesis: &mut Hypothesis) {
+        let (Some((split, _)), Some(member)) =
+            (self.quadrature_balance, hypothesis.position(EffectId::Anisoelasticity))
+        else {
+            return;
+        };
+        if hypothesis.members[member].values == EffectId::Anisoelasticity.neutral() {
+            hypothesis.members[member].values[..2].copy_from_slice(&split);
+        }
+    }
+
     /// Fits a hypothesis from where the runs are, moves them there and measures what is left; says whether that is what
     /// the fit was weighted by.
     fn fitted(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, effort: Effort) -> (Fit, bool) {
@@ -455,6 +468,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             None => dataset.balance_energy(&mut hypothesis),
         }
         dataset.balance_quadrature(&hypothesis);
+        dataset.begin_with_the_balance(&mut hypothesis);
         let last = round + 1 >= ROUNDS;
         dataset.drive_is_free =
             last && dataset.tells_the_drive() && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);

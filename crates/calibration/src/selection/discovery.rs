@@ -8,17 +8,21 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
 use rayon::prelude::*;
 
-use crate::diagnostics::evaluate::{ErrorSize, Evaluation, evaluate};
-use crate::diagnostics::residual::{Harmonic, WHITENESS_LAGS, autocorrelation, inflation, pattern_harmonics};
+use crate::diagnostics::evaluate::{ErrorSize, evaluate};
+use crate::diagnostics::residual::{Harmonic, pattern_harmonics};
 use crate::error::Refusal;
-use crate::estimation::amplitude_equation::energy_balance;
-use crate::estimation::fit::{Effort, Fit, fit};
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
-use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
 use crate::selection::consistency::inconsistency;
+use crate::selection::pairs::best_pair;
+use crate::selection::trial::{
+    CAREFUL, FINALISTS, QUICK, Trial, balance, count, extend, extend_from, floor, heldout, mean_square, on_heldout,
+    price, refit, sample_cost,
+};
 
 /// Gain in log-likelihood (×2, after the price of parameters and of the search) that a new effect must bring.
 pub const LEAST_GAIN: f64 = 12.0;
@@ -34,25 +38,9 @@ pub const REFUTED: f64 = 1.5;
 /// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
 pub const BY_AMPLITUDE: f64 = 0.8;
 /// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
-const NOTHING_LEFT: f64 = 1.2;
+pub(super) const NOTHING_LEFT: f64 = 1.2;
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 8;
-/// Candidates that are refitted in full after a quick round.
-const FINALISTS: usize = 4;
-
-/// A candidate after its refit.
-#[derive(Debug, Clone)]
-struct Trial {
-    candidate: Candidate,
-    fit: Fit,
-    /// gain in likelihood, price paid
-    gain: f64,
-    /// mean square of what the energy balance leaves
-    balance: Option<f64>,
-    /// the energy balance is worse with it than without
-    refuted: bool,
-}
-
 /// One accepted step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
@@ -80,10 +68,6 @@ pub struct Step {
     pub contradicted: bool,
 }
 
-/// One step from the fitted hypothesis: what it promises ranks the candidates.
-const QUICK: Effort = Effort { steps: 1, thinned: 400, polish: false };
-const CAREFUL: Effort = Effort { steps: 6, thinned: 6_000, polish: false };
-
 /// Adds effects to a fitted hypothesis until the residual asks for no more.
 ///
 /// # Errors
@@ -96,19 +80,52 @@ pub(crate) fn discover(
     let mut steps: Vec<Step> = Vec::new();
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
-        let Some((next, step)) = best_step(dataset, &fitted)? else {
-            // trials leave the runs as their own fits had them
-            if dataset.disturbed(&fitted.fit) {
-                fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
-            }
-            break;
-        };
+        if let Some((next, step)) = best_step(dataset, &fitted)? {
+            fitted = next;
+            steps.push(step);
+            continue;
+        }
+        restore(dataset, &mut fitted)?;
+        let Some((next, pair)) = best_pair(dataset, &fitted)? else { break };
         fitted = next;
-        steps.push(step);
+        steps.extend(pair);
     }
+    restore(dataset, &mut fitted)?;
     drop_weak(dataset, &mut fitted, &mut steps)?;
+    look_again(dataset, &mut fitted, &mut steps)?;
     check_run_consistency(dataset, &mut fitted.fit, &mut steps);
     Ok((fitted, steps))
+}
+
+/// Trials leave the runs as their own fits had them: fits them again as they were.
+fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), Refusal> {
+    if dataset.disturbed(&fitted.fit) {
+        *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
+    }
+    Ok(())
+}
+
+/// What stands without a cause is put on trial again beside all that came in after it: a cause that a larger effect hid
+/// takes its place where it leaves no more of the data that was not fitted.
+fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
+    for own in 0..steps.len() {
+        let alone = fitted.fit.hypothesis.members.len() < 2;
+        let at = (0..fitted.fit.hypothesis.members.len())
+            .find(|&at| step_of(&fitted.fit.hypothesis, at, steps) == Some(own));
+        let Some(at) = at.filter(|_| steps[own].origin == Origin::Empirical && !alone) else { continue };
+        let mut without = fitted.fit.hypothesis.clone();
+        without.members.remove(at);
+        let without = fit_with_ring_downs(dataset, &without)?;
+        let left = heldout(dataset, &fitted.fit);
+        match best_step(dataset, &without)? {
+            Some((next, step)) if step.origin == Origin::Discovered && heldout(dataset, &next.fit) <= left => {
+                *fitted = next;
+                steps[own] = step;
+            }
+            _ => *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?,
+        }
+    }
+    Ok(())
 }
 
 /// Which step brought a member in: members that are the same effect stand in the order of their steps.
@@ -175,11 +192,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
     // an effect as text may have no value where the refit led it
     trials.retain(|t| t.gain.is_finite());
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let apart = Distinguishable {
-        rates: dataset.tracks_differ(),
-        speeds: dataset.speeds_differ(),
-        mechanics: dataset.tracks.iter().all(|t| t.track.records_the_loops()),
-    };
+    let apart = Distinguishable::on(dataset);
     let balance_before = balance(dataset, &base);
     let heldout_before = heldout(dataset, &fitted.fit);
     let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, &fitted.fit)).powi(2);
@@ -213,11 +226,6 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
     }
 }
 
-/// Mean square of what the energy balance leaves under a fit.
-fn balance(dataset: &Dataset, fit: &Fit) -> Option<f64> {
-    energy_balance(&dataset.tracks, &fit.hypothesis, &fit.starts).map(|b| b.mean_square)
-}
-
 /// Asks the energy balance about the trials that may be chosen, and at one rate about those they have to be told from.
 fn amplitude_evidence(dataset: &Dataset, trials: &mut [Trial], before: Option<f64>, apart: Distinguishable) {
     let least = trials.first().map_or(0.0, |t| t.gain - LEAST_LEAD);
@@ -229,28 +237,41 @@ fn amplitude_evidence(dataset: &Dataset, trials: &mut [Trial], before: Option<f6
 
 /// What the fitted runs can tell apart.
 #[derive(Debug, Clone, Copy)]
-struct Distinguishable {
+pub(super) struct Distinguishable {
     /// runs at two or more rates, or in both directions
-    rates: bool,
+    pub(super) rates: bool,
     /// at two or more speeds
     speeds: bool,
     /// the loops' commands and the quadrature they left were recorded, which move the pattern too
     mechanics: bool,
 }
 
+impl Distinguishable {
+    pub(super) fn on(dataset: &Dataset) -> Self {
+        Self {
+            rates: dataset.tracks_differ(),
+            speeds: dataset.speeds_differ(),
+            mechanics: dataset.tracks.iter().all(|t| t.track.records_the_loops()),
+        }
+    }
+
+    /// Whether these runs could show a candidate to be a cause, and not only describe what is left.
+    pub(super) fn can_be_named(self, candidate: &Candidate) -> bool {
+        let d = candidate.id.description();
+        // at one speed a delay is a step between the directions
+        let delayed = d.scaling.rate > 0 && !self.speeds;
+        // without the loops' record what they do to the pattern looks like mechanics
+        let driven = d.stage == Stage::Mechanics && !self.mechanics;
+        // and a line in time may be one of the table or of what turns with it
+        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !self.speeds;
+        d.explains(&candidate.values) && !delayed && !driven && !in_time
+    }
+}
+
 /// The winner among refitted candidates, and in what capacity it comes in.
 fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, Vec<EffectId>)> {
     let best = trials.first().filter(|t| t.gain >= LEAST_GAIN)?;
-    let empirical = |t: &&Trial| {
-        let d = t.candidate.id.description();
-        // at one speed a delay is a step between the directions
-        let delayed = d.scaling.rate > 0 && !apart.speeds;
-        // without the loops' record what they do to the pattern looks like mechanics
-        let driven = d.stage == Stage::Mechanics && !apart.mechanics;
-        // and a line in time may be one of the table or of what turns with it
-        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !apart.speeds;
-        t.refuted || !d.explains(&t.candidate.values) || delayed || driven || in_time
-    };
+    let empirical = |t: &&Trial| t.refuted || !apart.can_be_named(&t.candidate);
     let described = trials.iter().find(empirical);
     let level = |t: &&Trial| !empirical(t) && t.gain >= best.gain - LEAST_LEAD && t.gain >= LEAST_GAIN;
     // of causes that explain the angle equally well, the one that closes the energy balance
@@ -332,77 +353,4 @@ fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Step>) 
             _ => return Ok(()),
         }
     }
-}
-
-/// The hypothesis with a candidate in it.
-fn extend(hypothesis: &Hypothesis, candidate: &Candidate, origin: Origin) -> Hypothesis {
-    let mut extended = hypothesis.clone();
-    match candidate.refine {
-        Some(member) => extended.members[member].refined = true,
-        None => {
-            let at = extended.admit(candidate.id, origin);
-            extended.members[at].values = candidate.values;
-        }
-    }
-    extended
-}
-
-/// The refitted hypothesis of a trial with the final origin of its new member.
-fn extend_from(trial: &Trial, origin: Origin) -> Hypothesis {
-    let mut extended = trial.fit.hypothesis.clone();
-    if trial.candidate.refine.is_none() {
-        // the newest of equal members stands last among them
-        if let Some(m) = extended.members.iter_mut().rev().find(|m| m.id == trial.candidate.id) {
-            m.origin = origin;
-        }
-    }
-    extended
-}
-
-fn refit(dataset: &Dataset, fitted: &Fitted, hypothesis: &Hypothesis, effort: Effort) -> Fit {
-    let unknowns: Vec<Unknown> = dataset.unknowns(hypothesis);
-    let priors = dataset.priors(hypothesis, fitted.drive.as_ref());
-    fit(&dataset.tracks, hypothesis, &unknowns, &priors, Role::Fit, effort)
-}
-
-fn count(fit: &Fit) -> f64 {
-    (fit.counted[0] + fit.counted[1]) as f64
-}
-
-/// Mean square after the last step; infinite where most of the data had to be set aside.
-fn mean_square(fit: &Fit) -> f64 {
-    if fit.counted[0] <= fit.set_aside.iter().sum() {
-        return f64::INFINITY;
-    }
-    fit.left() / count(fit).max(1.0)
-}
-
-/// ln n per parameter, and 2 ln of the alternatives tried.
-fn price(candidate: &Candidate, n: f64) -> f64 {
-    let parameters = candidate.id.description().parameters;
-    let adjusted = match candidate.refine {
-        Some(_) => parameters.iter().filter(|p| p.role == ParameterRole::Refined).count(),
-        None => parameters.iter().filter(|p| p.role != ParameterRole::Refined).count(),
-    };
-    adjusted as f64 * n.max(2.0).ln() + 2.0 * candidate.tried.ln()
-}
-
-fn sample_cost(evaluation: &Evaluation) -> f64 {
-    let correlation = autocorrelation(evaluation, WHITENESS_LAGS);
-    inflation(&correlation, evaluation.errors().count())
-}
-
-/// White part of the held-out error, rad.
-fn floor(dataset: &Dataset, fit: &Fit) -> f64 {
-    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
-}
-
-/// A fit on the held-out data.
-fn on_heldout(dataset: &Dataset, fit: &Fit) -> Evaluation {
-    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None)
-}
-
-/// Held-out mean square of a fit, rad².
-fn heldout(dataset: &Dataset, fit: &Fit) -> f64 {
-    on_heldout(dataset, fit).mean_square()
 }

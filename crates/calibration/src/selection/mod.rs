@@ -4,3 +4,5 @@ pub(crate) mod candidates;
 pub(crate) mod consistency;
 pub mod discovery;
 pub(crate) mod last_step;
+mod pairs;
+mod trial;
