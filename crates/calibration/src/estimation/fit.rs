@@ -29,6 +29,13 @@ pub(crate) struct Prior {
     pub(crate) considered: bool,
 }
 
+impl Prior {
+    /// The deviation of `unknown`, if these priors hold it as a considered one.
+    pub(super) fn of_considered(priors: &[Self], unknown: Unknown) -> Option<f64> {
+        priors.iter().find(|p| p.considered && p.unknown == unknown).map(|p| p.deviation)
+    }
+}
+
 /// Standard deviations of the residuals of one track: the scale of its weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Noise {
@@ -119,20 +126,8 @@ pub(crate) fn fit(
 ) -> Fit {
     let sorted = Unknowns::new(hypothesis, unknowns.to_vec());
     let n = unknowns.len();
-    let mut result = Fit {
-        hypothesis: hypothesis.clone(),
-        unknowns: unknowns.to_vec(),
-        covariance: DMatrix::zeros(n, n),
-        by_noise: DMatrix::zeros(n, n),
-        starts: tracks.iter().map(|t| t.starts.clone()).collect(),
-        chi2: [0.0; 2],
-        prior_chi2: 0.0,
-        step_gain: 0.0,
-        counted: [0; 2],
-        set_aside: vec![0; tracks.len()],
-    };
-    let considered: Vec<Option<f64>> =
-        unknowns.iter().map(|u| priors.iter().find(|p| p.considered && p.unknown == *u).map(|p| p.deviation)).collect();
+    let mut result = at_rest(tracks, hypothesis, unknowns);
+    let considered: Vec<Option<f64>> = unknowns.iter().map(|u| Prior::of_considered(priors, *u)).collect();
     let (mut widened, mut damping, mut polishing) = (1.0, 0.0, false);
     let mut best: Option<Linearised> = None;
     let mut step_number = 0;
@@ -201,6 +196,23 @@ pub(crate) fn fit(
     result
 }
 
+/// A fit before its first step.
+pub(super) fn at_rest(tracks: &[Prepared], hypothesis: &Hypothesis, unknowns: &[Unknown]) -> Fit {
+    let n = unknowns.len();
+    Fit {
+        hypothesis: hypothesis.clone(),
+        unknowns: unknowns.to_vec(),
+        covariance: DMatrix::zeros(n, n),
+        by_noise: DMatrix::zeros(n, n),
+        starts: tracks.iter().map(|t| t.starts.clone()).collect(),
+        chi2: [0.0; 2],
+        prior_chi2: 0.0,
+        step_gain: 0.0,
+        counted: [0; 2],
+        set_aside: vec![0; tracks.len()],
+    }
+}
+
 /// A change of this unknown bends the residuals as little as the angle that it moves: with it by δ rad, by some δ².
 fn is_straight(hypothesis: &Hypothesis, unknown: Unknown) -> bool {
     match unknown {
@@ -217,12 +229,12 @@ fn is_straight(hypothesis: &Hypothesis, unknown: Unknown) -> bool {
 }
 
 /// The least-squares problem around one hypothesis.
-struct Linearised {
+pub(super) struct Linearised {
     hypothesis: Hypothesis,
     starts: Vec<Vec<Start>>,
     sums: Vec<Vec<Sums>>,
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
+    pub(super) normal: DMatrix<f64>,
+    pub(super) right: DVector<f64>,
     chi2: [f64; 2],
     prior_chi2: f64,
     counted: [usize; 2],
@@ -230,7 +242,7 @@ struct Linearised {
 }
 
 impl Linearised {
-    fn new(at: &Fit, sums: Vec<Vec<Sums>>, priors: &[Prior], n: usize) -> Self {
+    pub(super) fn new(at: &Fit, sums: Vec<Vec<Sums>>, priors: &[Prior], n: usize) -> Self {
         let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let (mut chi2, mut prior_chi2, mut counted) = ([0.0; 2], 0.0, [0; 2]);
         let set_aside = sums.iter().map(|track| track.iter().map(|s| s.set_aside).sum()).collect();
@@ -259,8 +271,13 @@ impl Linearised {
         step.abs() * (self.normal[(unknown, unknown)] / weight.max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    fn mean_square(&self) -> f64 {
-        (self.chi2[0] + self.chi2[1] + self.prior_chi2) / (self.counted[0] + self.counted[1]).max(1) as f64
+    pub(super) fn mean_square(&self) -> f64 {
+        (self.chi2[0] + self.chi2[1] + self.prior_chi2) / self.samples().max(1.0)
+    }
+
+    /// Residuals that are counted.
+    pub(super) fn samples(&self) -> f64 {
+        (self.counted[0] + self.counted[1]) as f64
     }
 
     /// Moves `result` from here by `step`, biases and all.
@@ -297,7 +314,7 @@ pub(crate) fn thinning(track: &Track, hypothesis: &Hypothesis, samples: usize, e
 }
 
 /// Sums of all segments of a track; those of another role stay empty, so that the order of segments is kept.
-fn collect(
+pub(super) fn collect(
     prepared: &Prepared,
     starts: &[Start],
     hypothesis: &Hypothesis,

@@ -18,4 +18,5 @@ pub(crate) mod restricted_likelihood;
 pub(crate) mod screening;
 pub(crate) mod simplex;
 pub(crate) mod statistics;
+pub(crate) mod subsets;
 pub(crate) mod sums;

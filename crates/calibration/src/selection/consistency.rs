@@ -3,15 +3,19 @@
 //! An effect that is really there acts in every run as its definition says. Where a run shows a third of it, or twice as
 //! much, the definition fits only by accident: then it may correct, but it does not explain.
 
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
+use crate::error::Refusal;
 use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::Dataset;
+use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
+use crate::selection::candidates::Candidate;
+use crate::selection::discovery::{Distinguishable, LEAST_GAIN, Step, member_of};
+use crate::selection::trial::heldout;
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
 const TOLERATED_SHARE: f64 = 0.15;
@@ -92,8 +96,71 @@ impl Contribution {
     }
 }
 
+/// Asks every run for what was claimed. Where one contradicts a cause, a rival that all of them bear out takes its place; if
+/// there is none, the cause becomes an empirical description.
+///
+/// # Errors
+/// As for the fit.
+pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
+    for own in 0..steps.len() {
+        let Some(at) = member_of(&fitted.fit.hypothesis, own, steps) else { continue };
+        if fitted.fit.hypothesis.members[at].origin != Origin::Discovered {
+            continue;
+        }
+        let Some(why) = inconsistency(dataset, &fitted.fit, at) else { continue };
+        if let Some((id, next)) = rival_borne_out(dataset, fitted, at, &steps[own])? {
+            let step = &mut steps[own];
+            let gain = step.rivals.iter().find(|r| r.0 == id).map_or(step.gain, |r| r.1);
+            step.rivals.retain(|r| r.0 != id);
+            (step.id, step.gain) = (id, gain);
+            *fitted = next;
+            continue;
+        }
+        fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
+        steps[own].origin = Origin::Empirical;
+        steps[own].inconsistency = Some(why);
+    }
+    Ok(())
+}
+
+/// The one rival of a member that every run bears out, fitted in its place, where it leaves no more of the held-out samples.
+/// Of two that do, neither is the cause for sure.
+fn rival_borne_out(
+    dataset: &mut Dataset,
+    fitted: &Fitted,
+    at: usize,
+    step: &Step,
+) -> Result<Option<(EffectId, Fitted)>, Refusal> {
+    let apart = Distinguishable::on(dataset);
+    let left = heldout(dataset, &fitted.fit);
+    let mut found = None;
+    for (id, _) in step.rivals.iter().filter(|(_, gain)| *gain >= LEAST_GAIN) {
+        let candidate = Candidate { id: *id, values: id.neutral(), refine: None, tried: 1.0 };
+        let searched = |p: &Parameter| matches!(p.role, ParameterRole::Searched(_) | ParameterRole::Located(_));
+        if id.description().parameters.iter().any(searched) || !apart.can_be_named(&candidate) {
+            continue;
+        }
+        let mut hypothesis = fitted.fit.hypothesis.clone();
+        hypothesis.members.remove(at);
+        let place = hypothesis.admit(*id, Origin::Discovered);
+        let next = fit_with_ring_downs(dataset, &hypothesis)?;
+        let borne_out = heldout(dataset, &next.fit) <= left && inconsistency(dataset, &next.fit, place).is_none();
+        if borne_out && found.replace((*id, next)).is_some() {
+            found = None;
+            break;
+        }
+    }
+    let last = found.as_ref().map_or(&fitted.fit, |(_, next)| &next.fit);
+    if dataset.disturbed(last) {
+        let hypothesis = last.hypothesis.clone();
+        let again = fit_with_ring_downs(dataset, &hypothesis)?;
+        found = found.map(|(id, _)| (id, again));
+    }
+    Ok(found)
+}
+
 /// Why member `member` cannot be claimed as a cause, if the runs contradict it.
-pub(crate) fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> {
+fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> {
     for role in [Role::Fit, Role::Holdout] {
         let contribution = Contribution::new(dataset, fit, member, role);
         if role == Role::Holdout && contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {

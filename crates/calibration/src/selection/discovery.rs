@@ -11,13 +11,12 @@ use rayon::prelude::*;
 use crate::diagnostics::evaluate::{ErrorSize, evaluate};
 use crate::diagnostics::residual::{Harmonic, pattern_harmonics};
 use crate::error::Refusal;
-use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
-use crate::selection::consistency::inconsistency;
+use crate::selection::consistency::ask_every_run;
 use crate::selection::pairs::best_pair;
 use crate::selection::trial::{
     CAREFUL, FINALISTS, QUICK, Trial, balance, count, extend, extend_from, floor, heldout, mean_square, on_heldout,
@@ -93,8 +92,13 @@ pub(crate) fn discover(
     restore(dataset, &mut fitted)?;
     drop_weak(dataset, &mut fitted, &mut steps)?;
     look_again(dataset, &mut fitted, &mut steps)?;
-    check_run_consistency(dataset, &mut fitted.fit, &mut steps);
+    ask_every_run(dataset, &mut fitted, &mut steps)?;
     Ok((fitted, steps))
+}
+
+/// Which member a step brought in, the inverse of [`step_of`].
+pub(super) fn member_of(hypothesis: &Hypothesis, step: usize, steps: &[Step]) -> Option<usize> {
+    (0..hypothesis.members.len()).find(|&at| step_of(hypothesis, at, steps) == Some(step))
 }
 
 /// Trials leave the runs as their own fits had them: fits them again as they were.
@@ -108,11 +112,13 @@ fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), Refusal> {
 /// What stands without a cause is put on trial again beside all that came in after it: a cause that a larger effect hid
 /// takes its place where it leaves no more of the data that was not fitted.
 fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
+    if steps.len() < 2 {
+        // beside nothing else the trial would be the one that it had
+        return Ok(());
+    }
     for own in 0..steps.len() {
-        let alone = fitted.fit.hypothesis.members.len() < 2;
-        let at = (0..fitted.fit.hypothesis.members.len())
-            .find(|&at| step_of(&fitted.fit.hypothesis, at, steps) == Some(own));
-        let Some(at) = at.filter(|_| steps[own].origin == Origin::Empirical && !alone) else { continue };
+        let at = member_of(&fitted.fit.hypothesis, own, steps);
+        let Some(at) = at.filter(|_| steps[own].origin == Origin::Empirical) else { continue };
         let mut without = fitted.fit.hypothesis.clone();
         without.members.remove(at);
         let without = fit_with_ring_downs(dataset, &without)?;
@@ -133,22 +139,6 @@ pub(crate) fn step_of(hypothesis: &Hypothesis, at: usize, steps: &[Step]) -> Opt
     let id = hypothesis.members[at].id;
     let earlier = hypothesis.members[..at].iter().filter(|m| m.id == id).count();
     steps.iter().enumerate().filter(|(_, s)| s.id == id).nth(earlier).map(|(i, _)| i)
-}
-
-/// Asks every run for what was claimed: a cause that a run contradicts becomes an empirical description.
-fn check_run_consistency(dataset: &Dataset, fit: &mut Fit, steps: &mut [Step]) {
-    for at in 0..fit.hypothesis.members.len() {
-        let member = fit.hypothesis.members[at];
-        if member.origin != Origin::Discovered {
-            continue;
-        }
-        let Some(step) = step_of(&fit.hypothesis, at, steps).map(|i| &mut steps[i]) else { continue };
-        if let Some(inconsistency) = inconsistency(dataset, fit, at) {
-            fit.hypothesis.members[at].origin = Origin::Empirical;
-            step.origin = Origin::Empirical;
-            step.inconsistency = Some(inconsistency);
-        }
-    }
 }
 
 /// The best extension of a fitted hypothesis that earns its place.

@@ -9,21 +9,24 @@ use rayon::prelude::*;
 use crate::diagnostics::evaluate::evaluate;
 use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
-use crate::model::hypothesis::Origin;
+use crate::estimation::subsets::Superset;
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
 use crate::selection::discovery::{Distinguishable, LEAST_GAIN, LEAST_LEAD, NOTHING_LEFT, REFUTED, Step};
 use crate::selection::trial::{
-    CAREFUL, FINALISTS, QUICK, Trial, balance, count, extend, floor, heldout, mean_square, on_heldout, price, refit,
+    CAREFUL, FINALISTS, QUICK, balance, count, extend, floor, heldout, mean_square, on_heldout, price, refit,
     sample_cost,
 };
 
-/// Two candidates refitted together; the trial is that of the second.
-struct Pair {
-    first: Candidate,
-    trial: Trial,
+/// Two candidates refitted together.
+struct Pair<'a> {
+    causes: [&'a Candidate; 2],
+    fit: Fit,
+    gain: f64,
 }
 
 /// The pair of effects that explains all that is left, if there is one and no other pair does.
@@ -39,31 +42,33 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
     let before = left(&fitted.fit.starts);
     let causes: Vec<Candidate> = candidates(dataset, &fitted.fit.hypothesis, &before, &before)
         .into_iter()
-        .filter(|c| c.refine.is_none() && apart.can_be_named(c))
+        .filter(|c| c.refine.is_none() && apart.can_be_named(c) && c.id.description().onsets.is_empty())
         .collect();
-    let base = refit(dataset, fitted, &fitted.fit.hypothesis, QUICK);
-    let mut ranked = on_trial(dataset, fitted, &causes, mean_square(&base));
-    ranked.truncate(FINALISTS);
     let base = refit(dataset, fitted, &fitted.fit.hypothesis, CAREFUL);
     let worth = 1.0 / sample_cost(&before);
-    let mut ranked: Vec<Pair> = ranked
+    let finalists: Vec<[usize; 2]> = promising(dataset, fitted, &causes).into_iter().take(FINALISTS).collect();
+    let mut ranked: Vec<Pair<'_>> = finalists
         .into_par_iter()
         .map(|pair| {
-            let fit = refit(dataset, fitted, &pair.trial.fit.hypothesis, CAREFUL);
+            let pair = pair.map(|i| &causes[i]);
+            let with = |h: &Hypothesis, cause: &Candidate| extend(h, cause, Origin::Discovered);
+            let both = pair.iter().fold(fitted.fit.hypothesis.clone(), |h, cause| with(&h, cause));
+            let begun = refit(dataset, fitted, &both, QUICK);
+            let fit = refit(dataset, fitted, &begun.hypothesis, CAREFUL);
             let n = worth * count(&fit);
-            let gain = n * (mean_square(&base) / mean_square(&fit)).ln() - both_prices(&pair, causes.len(), n);
-            Pair { trial: Trial { fit, gain, ..pair.trial }, ..pair }
+            let gain = n * (mean_square(&base) / mean_square(&fit)).ln() - both_prices(pair, causes.len(), n);
+            Pair { causes: pair, fit, gain }
         })
-        .filter(|pair| pair.trial.gain >= LEAST_GAIN)
+        .filter(|pair| pair.gain >= LEAST_GAIN)
         .collect();
-    ranked.sort_by(|a, b| b.trial.gain.total_cmp(&a.trial.gain));
-    let told = |best: &Pair| ranked.get(1).is_none_or(|next| next.trial.gain < best.trial.gain - LEAST_LEAD);
+    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let told = |best: &Pair<'_>| ranked.get(1).is_none_or(|next| next.gain < best.gain - LEAST_LEAD);
     let Some(best) = ranked.first().filter(|best| told(best)) else { return Ok(None) };
-    let balances = [balance(dataset, &base), balance(dataset, &best.trial.fit)];
+    let balances = [balance(dataset, &base), balance(dataset, &best.fit)];
     if matches!(balances, [Some(before), Some(after)] if after > REFUTED * before) {
         return Ok(None);
     }
-    let next = fit_with_ring_downs(dataset, &best.trial.fit.hypothesis)?;
+    let next = fit_with_ring_downs(dataset, &best.fit.hypothesis)?;
     let after = on_heldout(dataset, &next.fit);
     if after.mean_square() > (NOTHING_LEFT * floor(dataset, &next.fit)).powi(2) {
         return Ok(None);
@@ -72,7 +77,7 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
     let step = |candidate: &Candidate| Step {
         id: candidate.id,
         origin: Origin::Discovered,
-        gain: best.trial.gain,
+        gain: best.gain,
         rivals: Vec::new(),
         heldout_rms_deg: rms,
         heldout: after.size(),
@@ -82,32 +87,40 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
         inconsistency: None,
         contradicted: false,
     };
-    let steps = [step(&best.first), step(&best.trial.candidate)];
+    let steps = best.causes.map(step);
     Ok(Some((next, steps)))
 }
 
-/// Every pair of different effects after one step, the most promising first.
-fn on_trial(dataset: &Dataset, fitted: &Fitted, causes: &[Candidate], base: f64) -> Vec<Pair> {
-    let pairs: Vec<(&Candidate, &Candidate)> = (0..causes.len())
-        .flat_map(|i| causes[i + 1..].iter().map(move |other| (&causes[i], other)))
-        .filter(|(a, b)| a.id != b.id)
+/// Every pair of different effects after one linear step, the most promising first.
+fn promising(dataset: &Dataset, fitted: &Fitted, causes: &[Candidate]) -> Vec<[usize; 2]> {
+    let mut all = fitted.fit.hypothesis.clone();
+    for cause in causes {
+        all = extend(&all, cause, Origin::Discovered);
+    }
+    let unknowns = dataset.unknowns(&all);
+    let priors = dataset.priors(&all, fitted.drive.as_ref());
+    let superset = Superset::new(&dataset.tracks, &all, &unknowns, &priors, QUICK.thinned);
+    let member = |c: &Candidate| all.members.iter().position(|m| m.id == c.id && m.values == c.values);
+    let members: Vec<Option<usize>> = causes.iter().map(member).collect();
+    let of_pair = |pair: &[usize; 2]| -> Vec<usize> {
+        let taken = |m: usize| pair.iter().any(|&c| members[c] == Some(m));
+        let own = |u: &Unknown| match u {
+            Unknown::Effect(m, _) => taken(*m) || !members.contains(&Some(*m)),
+            _ => true,
+        };
+        (0..unknowns.len()).filter(|&i| own(&unknowns[i])).collect()
+    };
+    let pairs = (0..causes.len()).flat_map(|i| (i + 1..causes.len()).map(move |j| [i, j]));
+    let mut ranked: Vec<(f64, [usize; 2])> = pairs
+        .filter(|[i, j]| causes[*i].id != causes[*j].id)
+        .filter_map(|pair| Some((superset.mean_square(&of_pair(&pair))?, pair)))
         .collect();
-    let mut ranked: Vec<Pair> = pairs
-        .into_par_iter()
-        .filter_map(|(first, second)| {
-            let one = extend(&fitted.fit.hypothesis, first, Origin::Discovered);
-            let fit = refit(dataset, fitted, &extend(&one, second, Origin::Discovered), QUICK);
-            let gain = (base / mean_square(&fit)).ln();
-            let trial = Trial { candidate: second.clone(), fit, gain, balance: None, refuted: false };
-            gain.is_finite().then(|| Pair { first: first.clone(), trial })
-        })
-        .collect();
-    ranked.sort_by(|a, b| b.trial.gain.total_cmp(&a.trial.gain));
-    ranked
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ranked.into_iter().map(|(_, pair)| pair).collect()
 }
 
 /// What both members of a pair cost, and the search over all pairs.
-fn both_prices(pair: &Pair, causes: usize, n: f64) -> f64 {
+fn both_prices(pair: [&Candidate; 2], causes: usize, n: f64) -> f64 {
     let pairs = (causes * causes.saturating_sub(1) / 2).max(1) as f64;
-    price(&pair.first, n) + price(&pair.trial.candidate, n) + 2.0 * pairs.ln()
+    price(pair[0], n) + price(pair[1], n) + 2.0 * pairs.ln()
 }
