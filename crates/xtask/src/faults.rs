@@ -57,43 +57,96 @@ enum Ending {
     Missed,
 }
 
-/// Plants the faults whose name or file contains one of `only`, all where there is none; every `nth` of them, from the first.
-pub(crate) fn run(only: &[&str], nth: usize) -> crate::Outcome {
+/// Which faults are planted.
+#[derive(Debug, Default)]
+pub(crate) struct Request<'a> {
+    /// those whose name or file contains one of these; all where there is none
+    pub(crate) only: Vec<&'a str>,
+    /// every so many of them, from the first; all where it is 0
+    pub(crate) every: usize,
+    /// as many as are begun in this time: those in files that the last commit changed, then those that it draws
+    pub(crate) most_s: Option<u64>,
+}
+
+/// Faults that are planted however little time there is: of none nothing follows.
+const FEWEST: usize = 4;
+
+/// Plants faults, and asks the tests that have to catch each.
+pub(crate) fn run(request: &Request<'_>) -> crate::Outcome {
     let started = Instant::now();
     let all = library();
-    let chosen: Vec<Fault> = all
-        .iter()
-        .filter(|f| only.is_empty() || only.iter().any(|text| f.name.contains(text) || f.file.contains(text)))
-        .step_by(nth.max(1))
-        .copied()
-        .collect();
+    let only = |f: &&Fault| {
+        request.only.is_empty() || request.only.iter().any(|text| f.name.contains(text) || f.file.contains(text))
+    };
+    let mut chosen: Vec<Fault> = all.iter().filter(only).step_by(request.every.max(1)).copied().collect();
+    if request.most_s.is_some() {
+        let commit = git(&["rev-parse", "HEAD"])?;
+        let changed = git(&["diff", "--name-only", "HEAD^"]).or_else(|_| git(&["ls-files"]))?;
+        draw(&mut chosen, commit.trim(), &changed.lines().collect());
+    }
     let tree = crate::repository().join("target/faults/tree");
     copied(&crate::repository(), &tree)?;
-    for layer in chosen.iter().map(|f| f.layer).collect::<BTreeSet<_>>() {
-        built(&tree, layer)?;
-        if !passes(&tree, layer)? {
-            return Err(format!("{} {} fails without a fault", layer.0, layer.1));
-        }
-    }
-    let mut missed = Vec::new();
+    let mut sound = BTreeSet::new();
+    let (mut planted_so_far, mut missed) = (0, Vec::new());
     for fault in &chosen {
+        // another layer is built for half of the time at most
+        let is_new = !sound.contains(&fault.layer);
+        let share = if is_new { 2 } else { 1 };
+        if request.most_s.is_some_and(|s| planted_so_far >= FEWEST && share * started.elapsed().as_secs() >= s) {
+            break;
+        }
+        if is_new {
+            sound.insert(fault.layer);
+            built(&tree, fault.layer)?;
+            if !passes(&tree, fault.layer)? {
+                return Err(format!("{} {} fails without a fault", fault.layer.0, fault.layer.1));
+            }
+        }
         let ending = planted(&tree, fault)?;
         println!("{} {}: {} by {} {}", fault.file, fault.name, word(ending), fault.layer.0, fault.layer.1);
+        planted_so_far += 1;
         if ending == Ending::Missed {
             missed.push(fault.name);
         }
     }
     println!(
-        "{} of {} faults planted, {} caught, {} s",
-        chosen.len(),
+        "{planted_so_far} of {} faults planted, {} caught, {} s",
         all.len(),
-        chosen.len() - missed.len(),
+        planted_so_far - missed.len(),
         started.elapsed().as_secs()
     );
     for name in &missed {
         println!("missed: {name}");
     }
     Ok(missed.is_empty())
+}
+
+/// What git says.
+fn git(arguments: &[&str]) -> Result<String, String> {
+    let output =
+        Command::new("git").args(arguments).current_dir(crate::repository()).output().map_err(|e| e.to_string())?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(format!("git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr)))
+    }
+}
+
+/// Puts faults in the order in which they are planted until time is up: those in changed files first; then layer by layer,
+/// which are built once, in an order that the commit draws. The interface for C is last: it takes longest to build.
+fn draw(faults: &mut [Fault], commit: &str, changed: &BTreeSet<&str>) {
+    let drawn = |text: &str| {
+        // FNV-1a, and a last mixing: names that differ in their end are to be far apart
+        let sum = commit
+            .bytes()
+            .chain(text.bytes())
+            .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+        (sum ^ (sum >> 31)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    };
+    faults.sort_by_cached_key(|f| {
+        let is_changed = changed.contains(format!("crates/{}", f.file).as_str());
+        (!is_changed, f.layer.0 == "cvg-capi", drawn(&format!("{} {}", f.layer.0, f.layer.1)), f.layer, drawn(f.name))
+    });
 }
 
 fn word(ending: Ending) -> &'static str {
@@ -200,6 +253,23 @@ mod tests {
             assert!(names.insert(fault.name), "{} is there twice", fault.name);
         }
         assert!(names.len() >= 60, "{} faults", names.len());
+    }
+
+    #[test]
+    fn a_commit_draws_its_own_order_after_what_it_changed() {
+        let order = |commit: &str, changed: &[&str]| {
+            let mut faults = library();
+            draw(&mut faults, commit, &changed.iter().copied().collect());
+            faults.iter().map(|f| (f.name, f.file, f.layer)).collect::<Vec<_>>()
+        };
+        let (one, other) = (order("1234", &[]), order("1235", &[]));
+        assert_eq!(one, order("1234", &[]));
+        assert_ne!(one[0].2, other[0].2, "another layer comes first");
+        let changed = order("1234", &["crates/controller/src/pi.rs"]);
+        let count = one.iter().filter(|f| f.1 == "controller/src/pi.rs").count();
+        assert!(count > 0 && changed[..count].iter().all(|f| f.1 == "controller/src/pi.rs"));
+        let layers = one.windows(2).filter(|w| w[0].2 != w[1].2).count() + 1;
+        assert_eq!(layers, one.iter().map(|f| f.2).collect::<BTreeSet<_>>().len(), "a layer is built once");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```sh
 //! cargo xtask prove [--only TEXT]   # the bit-precise harnesses, by CBMC on the compiled code
 //! cargo xtask audit                 # every equation, every requirement, and what this run says of it
-//! cargo xtask faults [--only TEXT]... [--every N]   # faults that an engineer makes, planted; tests have to catch each
+//! cargo xtask faults [--only TEXT]... [--every N] [--seconds N]   # faults that an engineer makes, planted; tests have to catch each
 //! ```
 #![forbid(unsafe_code)]
 
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER] | \
-     cargo xtask faults [--only TEXT]... [--every N]";
+     cargo xtask faults [--only TEXT]... [--every N] [--seconds N]";
 
 /// What a task returns: whether everything held, or why it could not be found out.
 type Outcome = Result<bool, String>;
@@ -43,15 +43,16 @@ fn request<'a>(options: &[&'a str]) -> Option<audit::Request<'a>> {
 
 /// What `cargo xtask faults` is asked for.
 fn planted(options: &[&str]) -> Outcome {
-    let (mut only, mut every) = (Vec::new(), 1);
+    let mut request = faults::Request::default();
     for pair in options.chunks(2) {
         match *pair {
-            ["--only", text] => only.push(text),
-            ["--every", n] => every = n.parse().map_err(|_| USAGE.to_owned())?,
+            ["--only", text] => request.only.push(text),
+            ["--every", n] => request.every = n.parse().map_err(|_| USAGE.to_owned())?,
+            ["--seconds", n] => request.most_s = Some(n.parse().map_err(|_| USAGE.to_owned())?),
             _ => return Err(USAGE.to_owned()),
         }
     }
-    faults::run(&only, every)
+    faults::run(&request)
 }
 
 fn main() -> ExitCode {
