@@ -85,8 +85,13 @@ fn below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 /// How often what happens by chance is tried: `CVG_KILLS`, or a few times.
-fn tries() -> u32 {
-    std::env::var("CVG_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(40)
+fn tries(few: u32) -> u32 {
+    std::env::var("CVG_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(few)
+}
+
+/// A share of a run: with each step another, evenly from all of it.
+fn moment(step: u32) -> f64 {
+    f64::from(step.wrapping_mul(2_654_435_769) >> 16) / 65536.0
 }
 
 #[test]
@@ -105,17 +110,18 @@ fn a_program_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_be
     assert!(rivals.simulate(2).wait().unwrap().success());
     let whole = begun.elapsed();
     let mut begun_and_left = 0;
-    for step in 0..tries() {
+    let kills = tries(40);
+    for step in 0..kills {
         let mut child = rivals.simulate(1 + step % 2);
         // every moment of a run has its turn
-        let at = whole.mul_f64(1.1 * f64::from(step.wrapping_mul(2_654_435_769) >> 16) / 65536.0);
+        let at = whole.mul_f64(1.1 * moment(step));
         std::thread::sleep(at);
         child.kill().unwrap();
         child.wait().unwrap();
         assert!(rivals.is_whole(&others), "try {step}: a mixture after {at:?} of {whole:?}");
         begun_and_left += usize::from(!rivals.leftovers().is_empty());
     }
-    println!("{begun_and_left} of {} left something unfinished behind", tries());
+    println!("{begun_and_left} of {kills} left something unfinished behind");
     assert!(rivals.simulate(1).wait().unwrap().success());
     assert!(rivals.is_whole(&others));
     assert_eq!(rivals.leftovers(), [] as [PathBuf; 0]);
@@ -124,17 +130,23 @@ fn a_program_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_be
 #[test]
 fn of_two_that_write_at_once_one_is_there_whole() {
     let rivals = Rivals::new();
-    for step in 0..tries().div_ceil(4) {
-        let mut both = [rivals.simulate(1), rivals.simulate(2)];
-        if step % 2 == 1 {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+    let (pairs, mut last) = (tries(10), [0; 2]);
+    let begun = std::time::Instant::now();
+    assert!(rivals.simulate(1).wait().unwrap().success());
+    let whole = begun.elapsed();
+    for step in 0..pairs {
+        // one begins while the other is anywhere in its run
+        let first = rivals.simulate(1 + step % 2);
+        std::thread::sleep(whole.mul_f64(moment(step)));
+        let mut both = [first, rivals.simulate(2 - step % 2)];
         for child in &mut both {
             assert!(child.wait().unwrap().success());
         }
         assert!(rivals.is_whole(&BTreeMap::new()), "pair {step}: a mixture");
         assert_eq!(rivals.leftovers(), [] as [PathBuf; 0]);
+        last[usize::from(below(&rivals.out()) == rivals.whole[1])] += 1;
     }
+    println!("of {pairs} pairs {} and {} were there in the end", last[0], last[1]);
 }
 
 #[test]
