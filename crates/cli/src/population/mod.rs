@@ -2,7 +2,7 @@
 //! are odd, which effects many share.
 //!
 //! A device is odd where that is no accident among all the comparisons that are made: in a fleet without an odd device, at
-//! most one in twenty has one named. What so many have that it is no exception is a group, not odd.
+//! most one in twenty has one named, and of many that are named one in twenty is expected to be none. What so many have that it is no exception is a group, not odd.
 
 pub(crate) mod course;
 pub(crate) mod device;
@@ -16,7 +16,8 @@ pub(crate) use self::device::{Device, Found, Quantity};
 use self::spread::{Measured, Spread, median};
 use crate::compare::Parameter;
 
-/// How probable it is that any device is named in a fleet in which none is odd.
+/// How probable it is that any device is named in a fleet in which none is odd; and of those that are named, the share that
+/// is expected to be none.
 const FALSE_ALARM: f64 = 0.05;
 /// Devices from which on a distribution tells what is odd.
 pub(crate) const FEWEST_DEVICES: usize = 8;
@@ -162,25 +163,36 @@ impl Population {
         }
     }
 
-    /// Values that are no accident among all the comparisons made.
+    /// Values that are no accident among all the comparisons made (Benjamini and Hochberg): the more stand out, the less far
+    /// out each has to be, so that tails which one outlier might be of do not hide several.
     fn odd_by_values(&mut self) {
         let comparisons: usize = self.lines.values().filter(|l| l.spread.is_some()).map(|l| l.values.len()).sum();
-        let most = FALSE_ALARM / comparisons.max(1) as f64;
-        for line in self.lines.values_mut() {
+        let alone = FALSE_ALARM / comparisons.max(1) as f64;
+        let mut claims: Vec<(f64, &str, usize, Measured)> = Vec::new();
+        let mut groups: BTreeMap<String, usize> = BTreeMap::new();
+        for (name, line) in &self.lines {
             let Some(spread) = &line.spread else { continue };
-            let judged = line.values.iter().map(|(at, m)| (*at, *m, spread.chance(*m)));
-            let far: Vec<_> = judged.filter(|(_, _, chance)| *chance < most).collect();
-            if far.len() > exceptions(line.values.len()) {
-                line.group = far.len();
-                continue;
+            let judged = line.values.iter().map(|(at, m)| (spread.chance(*m), name.as_str(), *at, *m));
+            let unlikely: Vec<_> = judged.filter(|(chance, ..)| *chance < FALSE_ALARM).collect();
+            let far = unlikely.iter().filter(|(chance, ..)| *chance < alone).count();
+            if far > exceptions(line.values.len()) {
+                groups.insert(name.clone(), far);
+            } else {
+                claims.extend(unlikely);
             }
-            for (at, m, chance) in far {
-                let oddity = Oddity::Value { of: line.of.clone(), value: m.value, deviations: spread.score(m), chance };
-                let odd = &mut self.odd[at];
-                if !odd.iter().any(|o| o.name() == line.of) {
-                    odd.push(oddity);
-                }
+        }
+        claims.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let holds = |(at, claim): &(usize, &(f64, &str, usize, Measured))| claim.0 < alone * (*at as f64 + 1.0);
+        let most = claims.iter().enumerate().filter(holds).map(|(at, _)| at + 1).next_back().unwrap_or(0);
+        for (chance, name, at, m) in &claims[..most] {
+            let line = &self.lines[*name];
+            let deviations = line.spread.as_ref().map_or(f64::NAN, |s| s.score(*m));
+            if !self.odd[*at].iter().any(|o| o.name() == line.of) {
+                self.odd[*at].push(Oddity::Value { of: line.of.clone(), value: m.value, deviations, chance: *chance });
             }
+        }
+        for (name, count) in groups {
+            self.lines.entry(name).and_modify(|line| line.group = count);
         }
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn page(population: &Population, devices: &[Device], facts: &Value) -
     quantities(&mut h, population, devices);
     draw(&mut h, "<p>The figures need scripts, which this file brings along.</p>", &figures);
     others(&mut h, devices);
-    let footer = "Odd: in a fleet without an odd device, at most one in twenty has one named.";
+    let footer = "Odd: in a fleet without an odd device, at most one in twenty has one named by its values.";
     let json = serde_json::to_string_pretty(facts).map_err(Failure::input)?;
     finish(&mut h, &json, facts["schema"].as_str().unwrap_or_default(), footer, &figures)?;
     Ok(h)
