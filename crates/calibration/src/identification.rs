@@ -24,7 +24,7 @@ use crate::recording::{Campaign, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
-use crate::report::inference::Inference;
+use crate::report::inference::{Inference, covering};
 use crate::report::proposals::proposals;
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
@@ -238,7 +238,11 @@ impl Found {
         let mut channels_left = channels(dataset, &self.declared_fit, "declared", &errors.declared_on_fit);
         channels_left.extend(channels(dataset, &fitted.fit, "discovered", &errors.on_fit));
         let inference = Inference { dataset, fitted, covariance: &self.covariance };
-        let detection_gain_ratio = inference.detection_ratio(&mut warnings);
+        let own_ratios = self.context(&[]).own_detection_ratios();
+        let names = || dataset.tracks.iter().map(|t| t.track.name.as_str());
+        let detection_gain_ratio = inference
+            .detection_ratio(&mut warnings)
+            .map(|all| covering(all, "detection gain ratio", names().zip(own_ratios.iter().copied()), &mut warnings));
         let actuation_gain_ratio = inference.actuation_ratio(&mut warnings);
         let effects = inference.effects(&self.steps, &errors.discovered);
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
@@ -261,7 +265,7 @@ impl Found {
             fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
         };
         let mut runs = self.runs(head.runs, &mut warnings);
-        let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some());
+        let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some().then_some(&own_ratios));
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
             schema: SCHEMA.into(),
@@ -322,16 +326,15 @@ impl Found {
     }
 
     /// How what the runs tell goes with their temperatures.
-    fn temperature(&self, runs: &mut [RunReport], tells_ratio: bool) -> Option<Temperature> {
+    fn temperature(&self, runs: &mut [RunReport], ratios: Option<&Vec<Option<[f64; 2]>>>) -> Option<Temperature> {
         if runs.iter().filter(|r| r.temp_c.is_some()).count() < 2 {
             return None;
         }
-        let ratios =
-            if tells_ratio { self.context(&[]).own_detection_ratios() } else { vec![None; self.dataset.tracks.len()] };
-        let told = self.dataset.screen.of(runs).into_iter().zip(&self.dataset.tracks).zip(ratios);
+        let told = self.dataset.screen.of(runs).into_iter().zip(&self.dataset.tracks).enumerate();
         let seen: Vec<Seen> = told
-            .filter_map(|((run, t), ratio)| {
-                run.detection_gain_ratio = ratio.filter(|_| run.temp_c.is_some());
+            .filter_map(|(at, (run, t))| {
+                let ratio = ratios.and_then(|own| own[at]);
+                run.detection_gain_ratio = ratio.filter(|_| run.temp_c.is_some()).map(|[value, _]| value);
                 let (rate, speed) = (t.track.mean_rate(), t.track.mean_speed());
                 let steady = (rate.abs() > ONE_WAY * speed).then_some(rate.to_degrees());
                 Some(Seen::of(run, steady, run.temp_c?))

@@ -57,7 +57,8 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let head = Head::of(&campaign);
     (options.progress)("preparing the runs");
-    let (fitted, held) = prepare(campaign)?;
+    let mut clipped = Vec::new();
+    let (fitted, held) = prepare(campaign, &mut clipped)?;
     if !rate_gyroscope {
         require_a_turn(&fitted, stated.unwrap_or(1.0))?;
     }
@@ -69,8 +70,9 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         ));
     }
     (options.progress)("choosing a model of the sensor");
-    let finding =
+    let mut finding =
         if rate_gyroscope { rate_finding(stated, period, &fitted)? } else { sensor_finding(stated, period, &fitted)? };
+    finding.warnings.extend(clipped);
     (options.progress)("measuring the held-out error");
     report(head, finding, &fitted, &held, with_plots)
 }

@@ -1,5 +1,7 @@
 //! Clipping of a channel at the rail of its converter: the extreme value occurs far more often than the level beside it.
 
+use super::samples::SensorRun;
+
 /// The extreme value has to occur this often, and in this share of the rows, to be a rail.
 const FEWEST_TIES: usize = 4;
 const LEAST_SHARE: f64 = 0.002;
@@ -55,6 +57,35 @@ impl Rails {
     }
 }
 
+/// Takes the rows at a rail out of runs that reach one which others go beyond: that converter had another range, and what is
+/// common to all runs does not know of it. Says of which.
+pub(crate) fn without_rails_of_their_own(runs: &[SensorRun], warnings: &mut Vec<String>) -> Vec<SensorRun> {
+    let readings = || runs.iter().filter_map(SensorRun::channels).flatten();
+    let ends: [[f64; 2]; 2] = std::array::from_fn(|channel| {
+        readings().map(|z| z[channel]).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)])
+    });
+    runs.iter()
+        .map(|run| {
+            let mut own = Rails::of(run.channels().into_iter().flatten());
+            for (limits, ends) in own.limits.iter_mut().zip(ends) {
+                let is_all_runs = limits.iter().zip(ends).all(|(rail, end)| !rail.is_finite() || *rail == end);
+                if is_all_runs {
+                    *limits = Rails::none().limits[0];
+                }
+            }
+            let Some(readings) = run.channels().filter(|_| own.any()) else { return run.clone() };
+            let kept: Vec<usize> = (0..run.len()).filter(|i| !own.clips(readings[*i])).collect();
+            warnings.push(format!(
+                "{}: {} rows stand at a rail that other runs go beyond, and are left out: a channel is clipped",
+                run.name,
+                run.len() - kept.len()
+            ));
+            run.subset(&kept)
+        })
+        .filter(|run| run.len() > 1)
+        .collect()
+}
+
 /// Whether the first of `sorted`, from the outermost inwards, is a rail.
 fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
     let count = sorted.len();
@@ -71,6 +102,7 @@ fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::samples::Reading;
     use super::*;
 
     fn circle(limit: f64) -> Vec<[f64; 2]> {
@@ -87,6 +119,37 @@ mod tests {
             [[f64::NEG_INFINITY, 511.0], [f64::NEG_INFINITY, f64::INFINITY]]
         );
         assert!(!Rails::of(circle(1e9).iter()).any());
+    }
+
+    #[test]
+    fn a_rail_that_other_runs_go_beyond_costs_its_run_the_rows_at_it() {
+        let run = |name: &str, limit: f64| {
+            let readings = circle(limit);
+            let t_s: Vec<f64> = (0..readings.len()).map(|i| 0.01 * i as f64).collect();
+            SensorRun {
+                name: name.into(),
+                number: 0,
+                role: crate::recording::Role::Fit,
+                commanded: false,
+                reference_rad: t_s.clone(),
+                rate_rad_s: t_s.clone(),
+                acceleration_rad_s2: t_s.clone(),
+                t_s,
+                reading: Reading::Channels(readings),
+            }
+        };
+        let kept = |limits: [f64; 2]| {
+            let mut warnings = Vec::new();
+            let runs = [run("a.csv", limits[0]), run("b.csv", limits[1])];
+            let left = without_rails_of_their_own(&runs, &mut warnings);
+            (left.iter().map(SensorRun::len).collect::<Vec<_>>(), warnings)
+        };
+        let (left, warnings) = kept([511.0, 1e9]);
+        let at_rail = circle(511.0).iter().filter(|z| z[0] >= 511.0).count();
+        assert_eq!(left, [2000 - at_rail, 2000]);
+        assert!(warnings.len() == 1 && warnings[0].starts_with("a.csv: "), "{warnings:?}");
+        // one converter for all: what its rail does is modelled
+        assert_eq!(kept([511.0, 511.0]), (vec![2000; 2], vec![]));
     }
 
     #[test]

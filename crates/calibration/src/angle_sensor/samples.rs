@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use super::rails::without_rails_of_their_own;
 use crate::data::track::wrapped;
 use crate::error::Refusal;
 use crate::recording::{Campaign, Reference, Role, Run};
@@ -147,14 +148,17 @@ impl SensorRun {
 }
 
 /// Makes the rotation runs of a campaign ready: those to fit, and those held out. Where none is held out, the last
-/// quarter in time of each is.
+/// quarter in time of each is. Says which rows are left out.
 ///
 /// # Errors
 /// Where a run has no reference or nothing to fit is left.
-pub(crate) fn prepare(campaign: Campaign) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
+pub(crate) fn prepare(
+    campaign: Campaign,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
     let stated = campaign.reference;
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::new(r, i, stated));
-    apart(runs.collect::<Result<_, _>>()?)
+    apart(without_rails_of_their_own(&runs.collect::<Result<Vec<_>, _>>()?, warnings))
 }
 
 /// The runs to fit, and those held out.

@@ -357,15 +357,18 @@ impl PlotContext<'_> {
     }
 
     /// The ratio of the detection gains as each track alone tells it, where it is a member: what the run says of the member's
-    /// share in the angle, which grows as the ratio less one.
-    pub(crate) fn own_detection_ratios(&self) -> Vec<Option<f64>> {
+    /// share in the angle, which grows as the ratio less one. With its standard deviation.
+    pub(crate) fn own_detection_ratios(&self) -> Vec<Option<[f64; 2]>> {
         let members = &self.hypothesis().members;
         let Some(at) = members.iter().position(|m| m.id == EffectId::DetectionGainMismatch) else {
             return vec![None; self.dataset.tracks.len()];
         };
+        let inflated = inflation(&autocorrelation(self.discovered, WHITENESS_LAGS), self.discovered.errors().count());
         let told = |s: &Share| {
-            let ratio = 1.0 + (members[at].values[0] - 1.0) * (1.0 + s.ed / s.dd);
-            (s.count > 0.0 && s.dd > 0.0 && ratio.is_finite()).then_some(ratio)
+            let less_one = members[at].values[0] - 1.0;
+            let own =
+                [1.0 + less_one * (1.0 + s.ed / s.dd), less_one.abs() * (s.ee / s.count * inflated / s.dd).sqrt()];
+            (s.count > 0.0 && s.dd > 0.0 && own.iter().all(|v| v.is_finite())).then_some(own)
         };
         self.shares(at).iter().map(told).collect()
     }

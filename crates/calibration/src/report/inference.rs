@@ -26,6 +26,32 @@ pub(crate) struct Inference<'a> {
     pub(crate) covariance: &'a DMatrix<f64>,
 }
 
+/// What a run says by itself contradicts all runs beyond this many of its standard deviations.
+const CONTRADICTS: f64 = 6.0;
+
+/// An estimate from all runs whose interval also covers what single runs contradict it with, each with its standard
+/// deviation: the fit takes what runs differ in for noise, and many samples make little of that. Says which do.
+pub(crate) fn covering<'a>(
+    all: Estimate,
+    what: &str,
+    runs: impl Iterator<Item = (&'a str, Option<[f64; 2]>)>,
+    warnings: &mut Vec<String>,
+) -> Estimate {
+    let half = all.half_width();
+    let off = |own: f64| (own - all.value).abs();
+    let contradicts = |own: f64, deviation: f64| off(own) > half.max(CONTRADICTS * deviation);
+    let odd: Vec<(&str, f64)> =
+        runs.filter_map(|(run, own)| own.filter(|[v, d]| contradicts(*v, *d)).map(|[v, _]| (run, v))).collect();
+    let Some(farthest) = odd.iter().map(|(_, own)| off(*own)).max_by(f64::total_cmp) else { return all };
+    let said: Vec<String> = odd.iter().take(4).map(|(run, own)| format!("{run} {own:.5}")).collect();
+    warnings.push(format!(
+        "the runs do not agree on the {what}, {:.5} of all of them: {}; its interval covers them",
+        all.value,
+        said.join(", ")
+    ));
+    all.widened(farthest - half)
+}
+
 impl Inference<'_> {
     fn hypothesis(&self) -> &Hypothesis {
         &self.fitted.fit.hypothesis
@@ -241,4 +267,24 @@ fn evidence(member: &Member, step: Option<&Step>) -> String {
         "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
         d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_covers_the_runs_that_contradict_it_and_no_others() {
+        let all = Estimate::new(1.0132, 1e-5);
+        let told = |own: [f64; 2]| {
+            let mut warnings = Vec::new();
+            let runs = [("a.csv", Some([1.0132, 1e-5])), ("b.csv", Some(own)), ("c.csv", None)];
+            (covering(all, "detection gain ratio", runs.into_iter(), &mut warnings), warnings)
+        };
+        let (estimate, warnings) = told([1.0152, 1e-5]);
+        assert!((estimate.ci95[1] - 1.0152).abs() < 1e-12 && (estimate.ci95[0] - 1.0112).abs() < 1e-12, "{estimate:?}");
+        assert!(warnings[0].contains("b.csv 1.01520") && !warnings[0].contains("a.csv"), "{warnings:?}");
+        // its noise allows that
+        assert_eq!(told([1.0152, 1e-3]), (all, vec![]));
+    }
 }

@@ -1,0 +1,168 @@
+//! No confident lie: small random campaigns with known values, damaged at random. An answer whose 99.9 % interval misses by
+//! more than its width is a lie.
+//!
+//! Known to be left: of two runs one is filtered, or of another device, and what the ratio of the gains differs by is taken
+//! for a damping that differs by axis, which goes with the rate as well; and a channel that is clipped where rows are so far
+//! apart that no two in a row show it.
+
+use std::collections::BTreeMap;
+
+use cvg_calibration::recording::{Campaign, Instrument, Recording};
+use cvg_calibration::report::{EffectReport, Estimate};
+use cvg_calibration::{Options, identify};
+use cvg_tests::bench::{Draws, all, trials};
+
+use super::damages::{DAMAGES, Damage, Shows};
+use super::{Made, RATIO, Told, campaign};
+
+/// Share of the campaigns that may be answered with a lie.
+const LIES: f64 = 0.01;
+/// An interval that is narrower than this is none of a measurement.
+const NARROWEST: f64 = 1e-9;
+
+/// Rows of a run: more of them take longer and show no more.
+const MOST_ROWS: f64 = 4000.0;
+
+/// Which runs of a campaign are damaged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Whose {
+    None,
+    One(usize),
+    All,
+}
+
+/// A campaign as it was drawn.
+struct Drawn {
+    campaign: Campaign,
+    angular_gain: f64,
+    damage: Option<&'static Damage>,
+    what: String,
+}
+
+/// What became of a campaign.
+struct Outcome {
+    damage: &'static str,
+    is_answered: bool,
+    is_lie: bool,
+    is_silent: bool,
+    what: String,
+}
+
+/// Draws campaign `number`.
+fn drawn(number: u64) -> Drawn {
+    let mut draw = Draws::new(1_000_000 + number);
+    let hz = [2.0, 5.0, 20.0, 100.0, 100.0, 100.0, 250.0][draw.below(7)];
+    let is_sensor = draw.below(4) == 0;
+    let angular_gain = if is_sensor { 1.0 } else { draw.between(0.3, 0.95) };
+    let runs = 1 + draw.below(4);
+    let noise_v = draw.scale(1e-6, 1e-3);
+    let reference = [Told::Rate, Told::Rate, Told::Table, Told::Both][draw.below(4)];
+    let whose = match draw.below(5) {
+        0 => Whose::None,
+        1 => Whose::All,
+        _ => Whose::One(draw.below(runs)),
+    };
+    // what shows beside sound runs only is done to one of several
+    let shows = |d: &Damage| d.shows == Shows::Alone || (runs > 1 && whose != Whose::All);
+    let damage = std::iter::repeat_with(|| &DAMAGES[draw.below(DAMAGES.len())]).find(|d| shows(d));
+    let damage = damage.filter(|_| whose != Whose::None);
+    let name = damage.map_or("nothing", |d| d.name);
+    let kind = if is_sensor { "sensor" } else { "gyroscope" };
+    let mut what = format!(
+        "#{number}: {kind}, k = {angular_gain:.5}, {hz} Hz, {reference:?}, noise {noise_v:.1e}, {name} of {whose:?}"
+    );
+    let recording = |i: usize| -> Recording {
+        let sign = if draw.below(2) == 0 { 1.0 } else { -1.0 };
+        let rate_dps = sign * draw.scale(30.0, 600.0);
+        let swings = if draw.below(4) == 0 { 1.0 } else { 0.0 };
+        let turns_s = if swings > 0.0 { 3000.0 } else { 2000.0 } / rate_dps.abs();
+        let duration_s = f64::max(800.0 / hz, turns_s);
+        let made = Made {
+            rate_dps,
+            duration_s,
+            sample_hz: hz.min(MOST_ROWS / duration_s),
+            angular_gain,
+            noise_v,
+            seed: 10 * number + i as u64,
+            swings,
+            reference,
+            is_sensor,
+        };
+        what.push_str(&format!("; {rate_dps:.0} dps × {swings}"));
+        match damage {
+            Some(damage) if whose == Whose::All || whose == Whose::One(i) => (damage.of)(&made, &mut draw),
+            _ => made.recording(),
+        }
+    };
+    let mut campaign = campaign((0..runs).map(recording).collect());
+    if is_sensor {
+        (campaign.instrument, campaign.angular_gain, campaign.period_deg) =
+            (Instrument::Sensor, Some(1.0), Some(360.0));
+    }
+    Drawn { campaign, angular_gain, damage, what }
+}
+
+/// The 99.9 % interval is 1.68 times that of 95 %; a lie misses it by more than its width.
+fn off(e: Estimate, by: f64) -> bool {
+    (e.value - by).abs() > 3.0 * 1.68 * e.half_width() + NARROWEST
+}
+
+fn outcome(number: u64) -> Outcome {
+    let Drawn { campaign, angular_gain, damage, what } = drawn(number);
+    let damage = damage.map_or("nothing", |d| d.name);
+    match identify(campaign, &Options::default()) {
+        Err(refusal) => {
+            Outcome { damage, is_answered: false, is_lie: false, is_silent: false, what: format!("{what}: {refusal}") }
+        }
+        Ok(identified) => {
+            let r = &identified.report;
+            let ratio = r.detection_gain_ratio;
+            let is_lie = off(r.angular_gain, angular_gain) || ratio.is_some_and(|e| off(e, RATIO));
+            let is_silent = r.warnings.is_empty();
+            let parameters = |e: &EffectReport| e.parameters.iter().map(|p| p.value).collect::<Vec<_>>();
+            let effects: Vec<String> =
+                r.effects.iter().map(|e| format!("{} {:?} {:?}", e.id, e.origin, parameters(e))).collect();
+            let what = format!(
+                "{what}: k {:?}, ratio {ratio:?}, {effects:?}, {:?}, {:#?}",
+                r.angular_gain, r.heldout.discovered, r.warnings
+            );
+            Outcome { damage, is_answered: true, is_lie, is_silent, what }
+        }
+    }
+}
+
+/// The same, said at once where it is a lie: ten thousand campaigns take their time.
+fn told(number: u64) -> Outcome {
+    let outcome = outcome(number);
+    if outcome.is_lie {
+        println!("a lie: {}", outcome.what);
+    }
+    outcome
+}
+
+/// More campaigns: `CVG_TRIALS=10000`; `CVG_TRIAL=17` shows one.
+#[test]
+fn damaged_campaigns_are_not_lied_about() {
+    if let Some(number) = std::env::var("CVG_TRIAL").ok().and_then(|n| n.parse().ok()) {
+        println!("{}", outcome(number).what);
+        return;
+    }
+    let outcomes = all(trials(200), told);
+    let mut table: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
+    for o in &outcomes {
+        let row = table.entry(o.damage).or_default();
+        *row = [row[0] + 1, row[1] + usize::from(o.is_answered), row[2] + usize::from(o.is_lie)];
+    }
+    for (damage, [all, answered, lies]) in &table {
+        println!("{damage}: {all} campaigns, {answered} answered, {lies} lies");
+    }
+    let lies: Vec<&Outcome> = outcomes.iter().filter(|o| o.is_lie).collect();
+    let answers = outcomes.iter().filter(|o| o.is_answered).count();
+    let silent = lies.iter().filter(|o| o.is_silent).count();
+    println!("{} campaigns, {answers} answered, {} lies, {silent} without a warning", outcomes.len(), lies.len());
+    for o in outcomes.iter().filter(|o| !o.is_answered && o.damage == "nothing") {
+        println!("refused though sound: {}", o.what);
+    }
+    assert!(lies.len() as f64 <= LIES * outcomes.len() as f64, "{} lies", lies.len());
+    assert!(answers as f64 > 0.3 * outcomes.len() as f64, "{answers} answers");
+}
