@@ -71,6 +71,42 @@ fn a_fault_of_eight_degrees_with_overtones_is_found_in_one_turn_each_way() {
     }
 }
 
+/// A resolver with a lag that turns one way through `turns`, at one speed but for ramps of half a second.
+fn one_way(seed: u64, role: Role, speed_dps: f64, turns: f64) -> Run {
+    let (mut noise, ramp) = (Noise::new(seed), 0.5);
+    let length = turns * 360.0 / speed_dps.abs() + ramp;
+    let path: Vec<(f64, f64, f64)> = (0..)
+        .map(|i| f64::from(i) * 0.004)
+        .take_while(|t| *t <= length)
+        .map(|t| {
+            let (up, down) = (t.min(ramp), (t - length + ramp).max(0.0));
+            let level = (t - ramp).clamp(0.0, length - 2.0 * ramp);
+            let angle = speed_dps * (0.5 * up * up / ramp + level + down - 0.5 * down * down / ramp);
+            (t, angle, speed_dps * (up - down) / ramp)
+        })
+        .collect();
+    let error = |angle: f64| 0.13 * (angle.to_radians() + 0.5).sin() + 0.08 * (4.0 * angle.to_radians()).cos();
+    let theta = |&(_, angle, rate): &(f64, f64, f64)| angle + error(angle) - 0.0017 * rate;
+    let recording = Recording {
+        t_s: path.iter().map(|p| p.0).collect(),
+        table_deg: Some(path.iter().map(|p| p.1).collect()),
+        theta_deg: Some(path.iter().map(|p| theta(p) + 0.03 * noise.sample()).collect()),
+        ..Recording::default()
+    };
+    run("one-way.csv", role, recording)
+}
+
+#[test]
+fn a_lag_shows_in_the_ramps_of_a_run_at_one_speed() {
+    for seed in 0..3 {
+        let runs = vec![one_way(seed, Role::Fit, -180.0, 1.7), one_way(seed + 100, Role::Holdout, 290.0, 2.1)];
+        let i = identified(sensor(runs));
+        assert!(held_out(&i) < 1.5 * 0.03, "{}° left of 0.03° noise: {:#?}", held_out(&i), i.report.effects);
+        let lag = find(&i, "angle-latency").unwrap_or_else(|| panic!("seed {seed}: {:#?}", i.report.effects));
+        assert!((lag.parameters[0].value - 0.0017).abs() < 2e-4, "seed {seed}: {lag:?}");
+    }
+}
+
 /// A magnetic encoder at the full steps of a motor with 200 a turn: every third quadruple is held out.
 fn encoder_at_stations(held: bool, seed: u64) -> Run {
     let mut noise = Noise::new(seed);

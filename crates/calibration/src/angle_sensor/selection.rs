@@ -274,7 +274,7 @@ pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
     [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
 }
 
-/// The reference turns at one speed, one way or both: a lag and a dead band are then the same.
+/// The reference turns at one speed both ways: a lag and a dead band are then nearly the same, and the ramps between tell little.
 fn speed_is_one(rates: &[f64], fastest: f64) -> bool {
     let mut speeds: Vec<f64> = rates.iter().map(|r| r.abs()).filter(|r| *r > 0.5 * fastest).collect();
     speeds.sort_by(f64::total_cmp);
