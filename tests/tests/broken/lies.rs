@@ -1,9 +1,8 @@
 //! No confident lie: small random campaigns with known values, damaged at random. An answer whose 99.9 % interval misses by
 //! more than its width is a lie.
 //!
-//! Known to be left: of two runs one is filtered, or of another device, and what the ratio of the gains differs by is taken
-//! for a damping that differs by axis, which goes with the rate as well; and a channel that is clipped where rows are so far
-//! apart that no two in a row show it.
+//! Known to be left: of two runs at two rates one is of another device, and what the ratio of the gains differs by is taken for a
+//! damping that differs by axis, which goes with the rate as well; little is left over to contradict it.
 
 use std::collections::BTreeMap;
 

@@ -1,13 +1,7 @@
 //! Clipping of a channel at the rail of its converter: the extreme value occurs far more often than the level beside it.
 
 use super::samples::SensorRun;
-
-/// The extreme value has to occur this often, and in this share of the rows, to be a rail.
-const FEWEST_TIES: usize = 4;
-const LEAST_SHARE: f64 = 0.002;
-/// … and this many times as often as the next level. A sine dwells at its peak: its last two levels of equal width are
-/// occupied as √2 : 2 − √2, 2.4 times at most.
-const TIES_OVER_NEXT: usize = 4;
+use crate::data::rail::is_rail;
 
 /// The rails of both channels, in their unit; infinite where none is reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,20 +78,6 @@ pub(crate) fn without_rails_of_their_own(runs: &[SensorRun], warnings: &mut Vec<
         })
         .filter(|run| run.len() > 1)
         .collect()
-}
-
-/// Whether the first of `sorted`, from the outermost inwards, is a rail.
-fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
-    let count = sorted.len();
-    let Some(extreme) = sorted.clone().next() else { return false };
-    let ties = sorted.clone().take_while(|v| *v == extreme).count();
-    let mut inner = sorted.skip(ties);
-    let next = inner.next();
-    let beside = next.map_or(0, |next| 1 + inner.take_while(|v| *v == next).count());
-    #[allow(clippy::cast_precision_loss, reason = "a count of rows")]
-    let enough = ties >= FEWEST_TIES && ties as f64 >= LEAST_SHARE * count as f64;
-    // half of all rows at one value is a channel that does not move
-    enough && ties > TIES_OVER_NEXT * beside.max(1) && 2 * ties < count
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 
 pub(crate) mod agreement;
 pub(crate) mod plausibility;
+pub(crate) mod rail;
 pub(crate) mod sampling;
 pub(crate) mod slips;
 pub(crate) mod track;

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use crate::data::rail::rows_at_rails;
 use crate::estimation::statistics::median;
 use crate::recording::{Channel, Recording};
 
@@ -54,6 +55,21 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
         findings.broken = Some(broken);
         return findings;
     }
+    let at_rails = rows_at_rails(recording);
+    let clipped = at_rails.iter().filter(|at| **at).count();
+    if clipped as f64 > MOST_LOST * recording.len() as f64 {
+        findings.broken = Some(Broken {
+            problem: format!("{clipped} of {} rows stand at the rail of a channel: it is clipped", recording.len()),
+            wanted: "a range of the converter that the amplitude does not exceed".into(),
+        });
+        return findings;
+    }
+    if clipped > 0 {
+        findings
+            .warnings
+            .push(format!("{name}: {clipped} rows stand at the rail of a channel and are left out: it is clipped"));
+        leave_out(recording, &at_rails);
+    }
     let rows = recording.len();
     let held = held_rows(recording);
     let lost: usize = held.iter().map(Range::len).sum();
@@ -93,7 +109,9 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
             list.join(", ")
         ));
     }
-    leave_out(recording, &held);
+    let mut repeated = vec![false; rows];
+    held.into_iter().for_each(|r| repeated[r].fill(true));
+    leave_out(recording, &repeated);
     findings
 }
 
@@ -231,12 +249,10 @@ impl<'a> Input<'a> {
 }
 
 /// Takes rows out of every channel. Columns of unknown meaning go: nothing here asks for them.
-fn leave_out(recording: &mut Recording, held: &[Range<usize>]) {
-    let mut keep = vec![true; recording.len()];
-    held.iter().for_each(|r| keep[r.clone()].fill(false));
+fn leave_out(recording: &mut Recording, rows: &[bool]) {
     for channel in Channel::ALL {
         if let Some(values) = recording.channel(channel) {
-            let kept = values.iter().zip(&keep).filter(|(_, k)| **k).map(|(v, _)| *v).collect();
+            let kept = values.iter().zip(rows).filter(|(_, out)| !**out).map(|(v, _)| *v).collect();
             recording.set_channel(channel, kept);
         }
     }
@@ -435,7 +451,20 @@ mod tests {
         let mut recording = recorded();
         recording.xc_v.iter_mut().flatten().for_each(|v| *v = v.clamp(-0.8, 0.8));
         let findings = mend(&mut recording);
-        assert!(findings.broken.is_some_and(|b| b.problem.contains("rows repeat")));
+        assert!(findings.broken.is_some_and(|b| b.problem.contains("it is clipped")));
+    }
+
+    #[test]
+    fn a_channel_whose_crests_are_clipped_loses_those_rows_wherever_they_are() {
+        let mut recording = recorded();
+        let values = recording.xc_v.as_mut().expect("a channel");
+        let top = 0.99 * values.iter().copied().fold(0.0, f64::max);
+        let above = values.iter().filter(|v| **v >= top).count();
+        values.iter_mut().for_each(|v| *v = v.min(top));
+        let findings = mend(&mut recording);
+        let said = format!("{above} rows stand at the rail");
+        assert!(findings.broken.is_none() && findings.warnings[0].contains(&said), "{said}: {findings:?}");
+        assert!(recording.len() == 2000 - above && recording.xc_v.iter().flatten().all(|v| *v < top));
     }
 
     #[test]
