@@ -2,6 +2,10 @@
 //! in the variance is the covariance of its part with the error over the variance of the error. Intervals are those of a
 //! jackknife over contiguous blocks (Künsch 1989): what an error remembers within a block is counted.
 
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
 use crate::estimation::linear::NormalEquations;
 use crate::report::Share;
 
@@ -24,9 +28,11 @@ pub(crate) fn decompose(error: &[f64], influences: &[Influence]) -> Vec<Share> {
     if n < 2 * BLOCKS {
         return Vec::new();
     }
-    let whole = shares(error, influences, n..n);
-    let without: Vec<Vec<f64>> =
-        (0..BLOCKS).map(|b| shares(error, influences, b * n / BLOCKS..(b + 1) * n / BLOCKS)).collect();
+    let moments: Vec<DMatrix<f64>> =
+        (0..BLOCKS).map(|b| moments_of(error, influences, b * n / BLOCKS..(b + 1) * n / BLOCKS)).collect();
+    let all: DMatrix<f64> = moments.iter().sum();
+    let whole = shares(&all, influences);
+    let without: Vec<Vec<f64>> = moments.iter().map(|block| shares(&(&all - block), influences)).collect();
     let names = influences.iter().map(|i| i.of).chain(["rest"]);
     names
         .enumerate()
@@ -39,32 +45,35 @@ pub(crate) fn decompose(error: &[f64], influences: &[Influence]) -> Vec<Share> {
         .collect()
 }
 
-fn shares(error: &[f64], influences: &[Influence], left_out: std::ops::Range<usize>) -> Vec<f64> {
-    let rows: Vec<usize> = (0..error.len()).filter(|i| !left_out.contains(i)).collect();
-    let centred = |values: &[f64]| {
-        let mean = rows.iter().map(|&i| values[i]).sum::<f64>() / rows.len() as f64;
-        rows.iter().map(|&i| values[i] - mean).collect::<Vec<f64>>()
-    };
-    let e = centred(error);
-    let columns: Vec<Vec<f64>> = influences.iter().flat_map(|i| &i.columns).map(|c| centred(c)).collect();
-    let mut equations = NormalEquations::new(columns.len());
-    let mut row = vec![0.0; columns.len()];
-    for (i, value) in e.iter().enumerate() {
-        for (entry, column) in row.iter_mut().zip(&columns) {
-            *entry = column[i];
-        }
-        equations.add(&row, *value);
-    }
-    let x = equations.damped(RIDGE).solve();
-    let power = e.iter().map(|v| v * v).sum::<f64>().max(f64::MIN_POSITIVE);
+/// Sums of products over a block of rows of one, every column and the error: of all and of each block, they tell what is left
+/// when that is left out.
+fn moments_of(error: &[f64], influences: &[Influence], block: Range<usize>) -> DMatrix<f64> {
+    let mut rows: Vec<f64> = vec![1.0; block.len()];
+    let columns = influences.iter().flat_map(|i| &i.columns).map(Vec::as_slice).chain([error]);
+    columns.for_each(|column| {
+        // about the mean of all, lest a large one swallow what varies
+        let mean = column.iter().sum::<f64>() / column.len() as f64;
+        rows.extend(column[block.clone()].iter().map(|v| v - mean));
+    });
+    let rows = DMatrix::from_vec(block.len(), rows.len() / block.len(), rows);
+    rows.tr_mul(&rows)
+}
+
+fn shares(moments: &DMatrix<f64>, influences: &[Influence]) -> Vec<f64> {
+    let unknowns = moments.nrows() - 2;
+    let sums = moments.view((1, 0), (unknowns + 1, 1));
+    let centred = moments.view((1, 1), (unknowns + 1, unknowns + 1)) - sums * sums.transpose() / moments[(0, 0)];
+    let right = centred.view((0, unknowns), (unknowns, 1)).column(0).into_owned();
+    let power = centred[(unknowns, unknowns)].max(f64::MIN_POSITIVE);
+    let normal = centred.view((0, 0), (unknowns, unknowns)).into_owned();
+    let x = NormalEquations::of(normal, right.clone()).damped(RIDGE).solve();
     let mut at = 0;
     let mut out: Vec<f64> = influences
         .iter()
         .map(|influence| {
             let range = at..at + influence.columns.len();
             at = range.end;
-            let product: f64 = range.map(|c| x[c] * columns[c].iter().zip(&e).map(|(a, b)| a * b).sum::<f64>()).sum();
-            product / power
+            range.map(|c| x[c] * right[c]).sum::<f64>() / power
         })
         .collect();
     out.push(1.0 - out.iter().sum::<f64>());

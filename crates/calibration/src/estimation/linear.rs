@@ -19,6 +19,11 @@ impl NormalEquations {
         Self { matrix: DMatrix::zeros(unknowns, unknowns), right: DVector::zeros(unknowns) }
     }
 
+    /// Of sums that were made elsewhere.
+    pub(crate) fn of(matrix: DMatrix<f64>, right: DVector<f64>) -> Self {
+        Self { matrix, right }
+    }
+
     /// Adds an equation `row · x = value`.
     pub(crate) fn add(&mut self, row: &[f64], value: f64) {
         for (j, b) in row.iter().enumerate().filter(|(_, b)| **b != 0.0) {
