@@ -1,8 +1,9 @@
 //! No confident lie: small random campaigns with known values, damaged at random. An answer whose 99.9 % interval misses by
 //! more than its width is a lie.
 //!
-//! Known to be left: of two runs at two rates one is of another device, and what the ratio of the gains differs by is taken for a
-//! damping that differs by axis, which goes with the rate as well; little is left over to contradict it.
+//! Known to be left: of two runs at two rates one is of another device, or channels were in each other's place for a while in
+//! both, and what the ratio of the gains differs by is taken for a damping that differs by axis, which goes with the rate as well;
+//! and a sensor alone whose channels were exchanged, for nothing says which way it counts.
 
 use std::collections::BTreeMap;
 
