@@ -23,11 +23,19 @@ pub enum Values {
 }
 
 impl Values {
-    pub(crate) fn len(&self) -> usize {
+    /// How many values.
+    #[must_use]
+    pub fn len(&self) -> usize {
         match self {
             Self::Numbers(values) => values.len(),
             Self::Texts(cells) => cells.len(),
         }
+    }
+
+    /// There is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 }
 

@@ -61,7 +61,7 @@ impl Member {
             text.push_str(&said(&self.columns, word, &self.name)?);
         }
         let names = self.columns.iter().position(|(name, _)| name == RUN).map(|at| self.columns.remove(at).1);
-        let rows = self.columns.first().map_or(0, |(_, values)| count(values));
+        let rows = self.columns.first().map_or(0, |(_, values)| values.len());
         let name_of = |row: usize| names.as_ref().map_or("recording".to_owned(), |names| cell(names, row));
         let mut of_runs: Vec<(String, Vec<usize>)> = Vec::new();
         for row in 0..rows {
@@ -85,7 +85,7 @@ impl Member {
             }
             // a column that another run or device has alone says nothing here
             let is_word = |name: &str| OF_DEVICE.contains(&name) || OF_RUN.contains(&name);
-            own.retain(|(name, values)| !is_word(name) && (0..count(values)).any(|row| !cell(values, row).is_empty()));
+            own.retain(|(name, values)| !is_word(name) && (0..values.len()).any(|row| !cell(values, row).is_empty()));
             runs.push((run, own));
         }
         service::campaign_of_text(&text, runs.into_iter().collect(), &Settings::default())
@@ -96,7 +96,7 @@ impl Member {
 fn said(columns: &Columns, word: &str, of: &str) -> Result<String, Failure> {
     let Some((_, values)) = columns.iter().find(|(name, _)| name == word) else { return Ok(String::new()) };
     let first = cell(values, 0);
-    if let Some(row) = (1..count(values)).find(|row| cell(values, *row) != first) {
+    if let Some(row) = (1..values.len()).find(|row| cell(values, *row) != first) {
         let other = cell(values, row);
         return Err(Failure::input(format!("{of}: `{word}` is {first} and {other}; wanted one value in all its rows")));
     }
@@ -109,13 +109,6 @@ fn said(columns: &Columns, word: &str, of: &str) -> Result<String, Failure> {
 
 fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
-}
-
-fn count(values: &Values) -> usize {
-    match values {
-        Values::Numbers(numbers) => numbers.len(),
-        Values::Texts(cells) => cells.len(),
-    }
 }
 
 /// A value as text; empty where there is none.

@@ -46,10 +46,7 @@ pub(super) fn columns(population: &Population, devices: &[Device]) -> Columns {
 pub(super) fn csv(columns: &Columns) -> String {
     let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
     let mut out = names.join(",") + "\n";
-    let rows = columns.first().map_or(0, |(_, values)| match values {
-        Values::Numbers(numbers) => numbers.len(),
-        Values::Texts(cells) => cells.len(),
-    });
+    let rows = columns.first().map_or(0, |(_, values)| values.len());
     for row in 0..rows {
         let cell = |(_, values): &(String, Values)| match values {
             Values::Numbers(numbers) => number(Some(numbers[row])),
