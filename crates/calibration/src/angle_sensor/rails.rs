@@ -1,7 +1,7 @@
 //! Clipping of a channel at the rail of its converter: the extreme value occurs far more often than the level beside it.
 
 use super::samples::SensorRun;
-use crate::data::rail::is_rail;
+use crate::data::rail::rails;
 
 /// The rails of both channels, in their unit; infinite where none is reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,18 +19,7 @@ impl Rails {
     /// The rails that the readings of all runs show.
     pub(crate) fn of<'a>(readings: impl Iterator<Item = &'a [f64; 2]>) -> Self {
         let readings: Vec<[f64; 2]> = readings.copied().collect();
-        let mut rails = Self::none();
-        for (channel, limits) in rails.limits.iter_mut().enumerate() {
-            let mut values: Vec<f64> = readings.iter().map(|z| z[channel]).collect();
-            values.sort_by(f64::total_cmp);
-            if is_rail(values.iter().copied()) {
-                limits[0] = values[0];
-            }
-            if is_rail(values.iter().rev().copied()) {
-                limits[1] = values[values.len() - 1];
-            }
-        }
-        rails
+        Self { limits: std::array::from_fn(|channel| rails(readings.iter().map(|z| z[channel]))) }
     }
 
     /// Which channels are at a rail.

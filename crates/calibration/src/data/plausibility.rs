@@ -447,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_that_is_clipped_is_left_out_where_it_is() {
+    fn a_channel_that_is_clipped_for_much_of_the_time_serves_for_nothing() {
         let mut recording = recorded();
         recording.xc_v.iter_mut().flatten().for_each(|v| *v = v.clamp(-0.8, 0.8));
         let findings = mend(&mut recording);

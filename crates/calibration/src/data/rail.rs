@@ -9,8 +9,17 @@ const LEAST_SHARE: f64 = 0.002;
 /// occupied as √2 : 2 − √2, 2.4 times at most.
 const TIES_OVER_NEXT: usize = 4;
 
+/// The rails that a channel reaches, lower and upper; infinite where it reaches none.
+pub(crate) fn rails(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let lower = if is_rail(sorted.iter().copied()) { sorted[0] } else { f64::NEG_INFINITY };
+    let upper = if is_rail(sorted.iter().rev().copied()) { sorted[sorted.len() - 1] } else { f64::INFINITY };
+    [lower, upper]
+}
+
 /// Whether the first of `sorted`, from the outermost inwards, is a rail.
-pub(crate) fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
+fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> bool {
     let count = sorted.len();
     let Some(extreme) = sorted.clone().next() else { return false };
     let ties = sorted.clone().take_while(|v| *v == extreme).count();
@@ -27,12 +36,8 @@ pub(crate) fn is_rail(sorted: impl ExactSizeIterator<Item = f64> + Clone) -> boo
 pub(crate) fn rows_at_rails(recording: &Recording) -> Vec<bool> {
     let mut out = vec![false; recording.len()];
     for values in [Channel::Xc, Channel::Yc].into_iter().filter_map(|c| recording.channel(c)) {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let lower = is_rail(sorted.iter().copied()).then(|| sorted[0]);
-        let upper = is_rail(sorted.iter().rev().copied()).then(|| sorted[sorted.len() - 1]);
-        let at_rail = |v: &f64| lower.is_some_and(|l| *v <= l) || upper.is_some_and(|u| *v >= u);
-        out.iter_mut().zip(values).for_each(|(out, v)| *out |= at_rail(v));
+        let [lower, upper] = rails(values.iter().copied());
+        out.iter_mut().zip(values).for_each(|(out, v)| *out |= *v <= lower || *v >= upper);
     }
     out
 }

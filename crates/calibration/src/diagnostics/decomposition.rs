@@ -28,8 +28,11 @@ pub(crate) fn decompose(error: &[f64], influences: &[Influence]) -> Vec<Share> {
     if n < 2 * BLOCKS {
         return Vec::new();
     }
+    let columns: Vec<&[f64]> = influences.iter().flat_map(|i| &i.columns).map(Vec::as_slice).chain([error]).collect();
+    let mean = |column: &&[f64]| column.iter().sum::<f64>() / n as f64;
+    let means: Vec<f64> = columns.iter().map(mean).collect();
     let moments: Vec<DMatrix<f64>> =
-        (0..BLOCKS).map(|b| moments_of(error, influences, b * n / BLOCKS..(b + 1) * n / BLOCKS)).collect();
+        (0..BLOCKS).map(|b| moments_of(&columns, &means, b * n / BLOCKS..(b + 1) * n / BLOCKS)).collect();
     let all: DMatrix<f64> = moments.iter().sum();
     let whole = shares(&all, influences);
     let without: Vec<Vec<f64>> = moments.iter().map(|block| shares(&(&all - block), influences)).collect();
@@ -45,17 +48,14 @@ pub(crate) fn decompose(error: &[f64], influences: &[Influence]) -> Vec<Share> {
         .collect()
 }
 
-/// Sums of products over a block of rows of one, every column and the error: of all and of each block, they tell what is left
-/// when that is left out.
-fn moments_of(error: &[f64], influences: &[Influence], block: Range<usize>) -> DMatrix<f64> {
+/// Sums of products over a block of rows of one and every column: of all and of each block, they tell what is left when that
+/// is left out. Columns count from their means, lest a large one swallow what varies.
+fn moments_of(columns: &[&[f64]], means: &[f64], block: Range<usize>) -> DMatrix<f64> {
     let mut rows: Vec<f64> = vec![1.0; block.len()];
-    let columns = influences.iter().flat_map(|i| &i.columns).map(Vec::as_slice).chain([error]);
-    columns.for_each(|column| {
-        // about the mean of all, lest a large one swallow what varies
-        let mean = column.iter().sum::<f64>() / column.len() as f64;
+    for (column, mean) in columns.iter().zip(means) {
         rows.extend(column[block.clone()].iter().map(|v| v - mean));
-    });
-    let rows = DMatrix::from_vec(block.len(), rows.len() / block.len(), rows);
+    }
+    let rows = DMatrix::from_vec(block.len(), 1 + columns.len(), rows);
     rows.tr_mul(&rows)
 }
 

@@ -31,7 +31,7 @@ pub(crate) struct Prior {
 
 impl Prior {
     /// The deviation of `unknown`, if these priors hold it as a considered one.
-    pub(super) fn of_considered(priors: &[Self], unknown: Unknown) -> Option<f64> {
+    pub(super) fn considered_deviation(priors: &[Self], unknown: Unknown) -> Option<f64> {
         priors.iter().find(|p| p.considered && p.unknown == unknown).map(|p| p.deviation)
     }
 }
@@ -127,7 +127,7 @@ pub(crate) fn fit(
     let sorted = Unknowns::new(hypothesis, unknowns.to_vec());
     let n = unknowns.len();
     let mut result = at_rest(tracks, hypothesis, unknowns);
-    let considered: Vec<Option<f64>> = unknowns.iter().map(|u| Prior::of_considered(priors, *u)).collect();
+    let considered: Vec<Option<f64>> = unknowns.iter().map(|u| Prior::considered_deviation(priors, *u)).collect();
     let (mut widened, mut damping, mut polishing) = (1.0, 0.0, false);
     let mut best: Option<Linearised> = None;
     let mut step_number = 0;

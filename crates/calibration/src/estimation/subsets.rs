@@ -32,7 +32,7 @@ impl Superset {
             })
             .collect();
         let here = at_rest(tracks, hypothesis, unknowns);
-        let considered = unknowns.iter().map(|u| Prior::of_considered(priors, *u)).collect();
+        let considered = unknowns.iter().map(|u| Prior::considered_deviation(priors, *u)).collect();
         Self { at: Linearised::new(&here, sums, priors, unknowns.len()), considered }
     }
 
