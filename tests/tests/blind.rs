@@ -269,7 +269,8 @@ fn a_cause_that_a_larger_effect_hid_is_named_in_the_end() {
     named_without_a_flaw(&BALANCED, 73);
 }
 
-/// From a split of zero the fit of this campaign ended beyond another minimum, at 62 times the noise.
+/// From a split of zero the declared fit of this campaign ended beyond another minimum, and of its two effects one was never
+/// named.
 #[test]
 fn a_large_split_under_a_fast_rotation_is_found() {
     named_without_a_flaw(&ELECTRONICS, 20_054);

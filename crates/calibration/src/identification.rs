@@ -34,8 +34,9 @@ use crate::report::{
     EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, ScaleFactor, Status,
     Temperature, Tool,
 };
-use crate::selection::discovery::{Step, discover};
+use crate::selection::discovery::discover;
 use crate::selection::last_step::last_step;
+use crate::selection::step::Step;
 
 /// How an identification is run.
 pub struct Options<'a> {

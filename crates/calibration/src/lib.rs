@@ -62,7 +62,7 @@ pub use model::written::export::export;
 pub use model::written::{EffectText, Law, ParameterText};
 pub use report::calibration;
 pub use report::compensate::{compensate, left_out, outside};
-pub use selection::discovery;
+pub use selection::step::Step;
 pub use survey::{Answer, Surveyed, answer};
 
 /// The page of the book on campaigns in memory, whose program is run with the tests.

@@ -11,7 +11,7 @@ use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport};
-use crate::selection::discovery::Step;
+use crate::selection::step::Step;
 
 /// Share of its prior's width to which an unknown must narrow to count as told by the data.
 const MIN_CONTRACTION: f64 = 0.1;

@@ -4,7 +4,7 @@ use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{Follows, reported_harmonics};
 use crate::model::hypothesis::Origin;
 use crate::report::{Rival, StepReport};
-use crate::selection::discovery::Step;
+use crate::selection::step::Step;
 
 /// The steps of a report. The noise of every one is that of the last: what the others have besides is no noise.
 pub(crate) fn stages(

@@ -10,7 +10,7 @@ use crate::diagnostics::residual::{
 use crate::estimation::joint_fit::Dataset;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::report::Unexplained;
-use crate::selection::discovery::Step;
+use crate::selection::step::Step;
 
 /// A line's power over the mean square of the residual, from which it is no accident among those that were looked at:
 /// exp(−power/2) times their number is below one in a thousand.

@@ -6,7 +6,9 @@
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
+use crate::diagnostics::residual::{
+    Follows, WHITENESS_LAGS, autocorrelation, inflation, pattern_harmonics, strongest_harmonics,
+};
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
@@ -14,8 +16,8 @@ use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;
-use crate::selection::discovery::{Distinguishable, LEAST_GAIN, Step, member_of};
-use crate::selection::trial::heldout;
+use crate::selection::step::{Step, member_of};
+use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, heldout, on_heldout, restore};
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
 const TOLERATED_SHARE: f64 = 0.15;
@@ -108,19 +110,37 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
             continue;
         }
         let Some(why) = inconsistency(dataset, &fitted.fit, at) else { continue };
-        if let Some((id, next)) = rival_borne_out(dataset, fitted, at, &steps[own])? {
-            let step = &mut steps[own];
-            let gain = step.rivals.iter().find(|r| r.0 == id).map_or(step.gain, |r| r.1);
-            step.rivals.retain(|r| r.0 != id);
-            (step.id, step.gain) = (id, gain);
-            *fitted = next;
-            continue;
+        match rival_borne_out(dataset, fitted, at, &steps[own])? {
+            Some((id, next)) => {
+                *fitted = next;
+                steps[own] = in_its_place(dataset, &fitted.fit, id, &steps[own]);
+            }
+            None => {
+                fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
+                steps[own].origin = Origin::Empirical;
+                steps[own].inconsistency = Some(why);
+            }
         }
-        fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
-        steps[own].origin = Origin::Empirical;
-        steps[own].inconsistency = Some(why);
+        restore(dataset, fitted)?;
     }
     Ok(())
+}
+
+/// A step with the rival that took its place.
+fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step {
+    let after = on_heldout(dataset, fit);
+    let rms = after.mean_square().sqrt().to_degrees();
+    let balance = balance(dataset, fit).map(f64::sqrt);
+    Step {
+        id,
+        gain: step.rivals.iter().find(|r| r.0 == id).map_or(step.gain, |r| r.1),
+        rivals: step.rivals.iter().filter(|r| r.0 != id).copied().collect(),
+        heldout_rms_deg: [step.heldout_rms_deg[0], rms],
+        heldout: after.size(),
+        harmonics: pattern_harmonics(&after),
+        energy_balance: step.energy_balance.zip(balance).map(|([before, _], after)| [before, after]),
+        ..step.clone()
+    }
 }
 
 /// The one rival of a member that every run bears out, fitted in its place, where it leaves no more of the held-out samples.
@@ -149,12 +169,6 @@ fn rival_borne_out(
             found = None;
             break;
         }
-    }
-    let last = found.as_ref().map_or(&fitted.fit, |(_, next)| &next.fit);
-    if dataset.disturbed(last) {
-        let hypothesis = last.hypothesis.clone();
-        let again = fit_with_ring_downs(dataset, &hypothesis)?;
-        found = found.map(|(id, _)| (id, again));
     }
     Ok(found)
 }

@@ -5,67 +5,30 @@
 //! error on data that was not fitted. Effects come in one at a time; weak ones are dropped again. Where two causes of
 //! the library explain a residual equally well, neither is claimed: an empirical harmonic stands in for both.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
+use cvg_model::effects::{EffectId, Stage};
 use rayon::prelude::*;
 
-use crate::diagnostics::evaluate::{ErrorSize, evaluate};
-use crate::diagnostics::residual::{Harmonic, pattern_harmonics};
+use crate::diagnostics::evaluate::evaluate;
+use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
-use crate::model::hypothesis::{Hypothesis, Origin};
+use crate::model::hypothesis::Origin;
 use crate::recording::Role;
-use crate::selection::candidates::{Candidate, candidates};
+use crate::selection::candidates::candidates;
 use crate::selection::consistency::ask_every_run;
 use crate::selection::pairs::best_pair;
+use crate::selection::step::{Step, member_of, step_of};
 use crate::selection::trial::{
-    CAREFUL, FINALISTS, QUICK, Trial, balance, count, extend, extend_from, floor, heldout, mean_square, on_heldout,
-    price, refit, sample_cost,
+    Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_HELDOUT_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK,
+    REFUTED, Trial, balance, count, extend, extend_from, heldout, mean_square, on_heldout, price, refit, restore,
+    sample_cost,
 };
 
-/// Gain in log-likelihood (×2, after the price of parameters and of the search) that a new effect must bring.
-pub const LEAST_GAIN: f64 = 12.0;
-/// By how much it must beat a rival of the library to be told apart from it.
-pub const LEAST_LEAD: f64 = 8.0;
-/// The share of the held-out mean square that it must remove.
-pub const LEAST_HELDOUT_GAIN: f64 = 0.05;
-/// What it removes from the held-out error must be this large beside the noise floor: smaller ones are often what a
-/// larger effect leaves when its place in the chain of the readout is not quite the library's.
-pub const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
-/// A cause under which the energy balance leaves this many times the mean square is refuted.
-pub const REFUTED: f64 = 1.5;
 /// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
-pub const BY_AMPLITUDE: f64 = 0.8;
-/// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
-pub(super) const NOTHING_LEFT: f64 = 1.2;
+const BY_AMPLITUDE: f64 = 0.8;
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 8;
-/// One accepted step.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Step {
-    /// the effect
-    pub id: EffectId,
-    /// how it came in
-    pub origin: Origin,
-    /// gain in log-likelihood ×2 after the price of its parameters and of the search
-    pub gain: f64,
-    /// best rivals and their gains
-    pub rivals: Vec<(EffectId, f64)>,
-    /// held-out rms before and after, deg
-    pub heldout_rms_deg: [f64; 2],
-    /// size of the held-out error after it
-    pub heldout: ErrorSize,
-    /// harmonics of the pattern in it
-    pub harmonics: Vec<Harmonic>,
-    /// effects of the library that explain the residual as well
-    pub confounded_with: Vec<EffectId>,
-    /// rms of what the energy balance leaves of ln a, before and after; where amplitude and commands were recorded
-    pub energy_balance: Option<[f64; 2]>,
-    /// why a cause of the library is not claimed
-    pub inconsistency: Option<String>,
-    /// the energy balance contradicts it, or a cause that explains the angle as well
-    pub contradicted: bool,
-}
 
 /// Adds effects to a fitted hypothesis until the residual asks for no more.
 ///
@@ -96,19 +59,6 @@ pub(crate) fn discover(
     Ok((fitted, steps))
 }
 
-/// Which member a step brought in, the inverse of [`step_of`].
-pub(super) fn member_of(hypothesis: &Hypothesis, step: usize, steps: &[Step]) -> Option<usize> {
-    (0..hypothesis.members.len()).find(|&at| step_of(hypothesis, at, steps) == Some(step))
-}
-
-/// Trials leave the runs as their own fits had them: fits them again as they were.
-fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), Refusal> {
-    if dataset.disturbed(&fitted.fit) {
-        *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
-    }
-    Ok(())
-}
-
 /// What stands without a cause is put on trial again beside all that came in after it: a cause that a larger effect hid
 /// takes its place where it leaves no more of the data that was not fitted.
 fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
@@ -121,24 +71,17 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
         let Some(at) = at.filter(|_| steps[own].origin == Origin::Empirical) else { continue };
         let mut without = fitted.fit.hypothesis.clone();
         without.members.remove(at);
-        let without = fit_with_ring_downs(dataset, &without)?;
         let left = heldout(dataset, &fitted.fit);
+        let without = fit_with_ring_downs(dataset, &without)?;
         match best_step(dataset, &without)? {
             Some((next, step)) if step.origin == Origin::Discovered && heldout(dataset, &next.fit) <= left => {
                 *fitted = next;
                 steps[own] = step;
             }
-            _ => *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?,
+            _ => restore(dataset, fitted)?,
         }
     }
     Ok(())
-}
-
-/// Which step brought a member in: members that are the same effect stand in the order of their steps.
-pub(crate) fn step_of(hypothesis: &Hypothesis, at: usize, steps: &[Step]) -> Option<usize> {
-    let id = hypothesis.members[at].id;
-    let earlier = hypothesis.members[..at].iter().filter(|m| m.id == id).count();
-    steps.iter().enumerate().filter(|(_, s)| s.id == id).nth(earlier).map(|(i, _)| i)
 }
 
 /// The best extension of a fitted hypothesis that earns its place.
@@ -184,8 +127,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
     trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let apart = Distinguishable::on(dataset);
     let balance_before = balance(dataset, &base);
-    let heldout_before = heldout(dataset, &fitted.fit);
-    let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, &fitted.fit)).powi(2);
+    let before_it = Before::of(dataset, &fitted.fit);
     loop {
         amplitude_evidence(dataset, &mut trials, balance_before, apart);
         let Some((chosen, origin, confounded_with)) = choose(&trials, apart) else { return Ok(None) };
@@ -194,8 +136,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
         let after = on_heldout(dataset, &next.fit);
         let heldout_after = after.mean_square();
         trials.retain(|t| t.candidate != chosen.candidate);
-        if heldout_after > (1.0 - LEAST_HELDOUT_GAIN) * heldout_before || heldout_before - heldout_after < least_removed
-        {
+        if !before_it.is_improved_by(heldout_after) {
             // gained on the fitted data only, or too little to name: the next one's turn
             continue;
         }
@@ -204,7 +145,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
             origin,
             gain: chosen.gain,
             rivals: trials.iter().map(|t| (t.candidate.id, t.gain)).take(3).collect(),
-            heldout_rms_deg: [heldout_before, heldout_after].map(|square| square.sqrt().to_degrees()),
+            heldout_rms_deg: [before_it.mean_square, heldout_after].map(|square| square.sqrt().to_degrees()),
             heldout: after.size(),
             harmonics: pattern_harmonics(&after),
             confounded_with,
@@ -222,39 +163,6 @@ fn amplitude_evidence(dataset: &Dataset, trials: &mut [Trial], before: Option<f6
     for t in trials.iter_mut().filter(|t| t.balance.is_none() && (t.gain > least || !apart.rates)) {
         t.balance = balance(dataset, &t.fit);
         t.refuted = before.zip(t.balance).is_some_and(|(before, after)| after > REFUTED * before);
-    }
-}
-
-/// What the fitted runs can tell apart.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Distinguishable {
-    /// runs at two or more rates, or in both directions
-    pub(super) rates: bool,
-    /// at two or more speeds
-    speeds: bool,
-    /// the loops' commands and the quadrature they left were recorded, which move the pattern too
-    mechanics: bool,
-}
-
-impl Distinguishable {
-    pub(super) fn on(dataset: &Dataset) -> Self {
-        Self {
-            rates: dataset.tracks_differ(),
-            speeds: dataset.speeds_differ(),
-            mechanics: dataset.tracks.iter().all(|t| t.track.records_the_loops()),
-        }
-    }
-
-    /// Whether these runs could show a candidate to be a cause, and not only describe what is left.
-    pub(super) fn can_be_named(self, candidate: &Candidate) -> bool {
-        let d = candidate.id.description();
-        // at one speed a delay is a step between the directions
-        let delayed = d.scaling.rate > 0 && !self.speeds;
-        // without the loops' record what they do to the pattern looks like mechanics
-        let driven = d.stage == Stage::Mechanics && !self.mechanics;
-        // and a line in time may be one of the table or of what turns with it
-        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !self.speeds;
-        d.explains(&candidate.values) && !delayed && !driven && !in_time
     }
 }
 

@@ -11,7 +11,8 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::{Instrument, Role};
-use crate::selection::discovery::{LEAST_GAIN, Step, step_of};
+use crate::selection::step::{Step, step_of};
+use crate::selection::trial::LEAST_GAIN;
 use cvg_model::effects::Role as ParameterRole;
 
 /// A last step that leaves more than this many times the mean square of held-back data is not made: it is linear, and

@@ -2,7 +2,8 @@
 
 pub(crate) mod candidates;
 pub(crate) mod consistency;
-pub mod discovery;
+pub(crate) mod discovery;
 pub(crate) mod last_step;
 mod pairs;
+pub(crate) mod step;
 mod trial;

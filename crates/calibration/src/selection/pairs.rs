@@ -16,10 +16,10 @@ use crate::estimation::subsets::Superset;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
-use crate::selection::discovery::{Distinguishable, LEAST_GAIN, LEAST_LEAD, NOTHING_LEFT, REFUTED, Step};
+use crate::selection::step::Step;
 use crate::selection::trial::{
-    CAREFUL, FINALISTS, QUICK, balance, count, extend, floor, heldout, mean_square, on_heldout, price, refit,
-    sample_cost,
+    Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK, REFUTED, balance, count,
+    extend, floor, mean_square, on_heldout, price, refit, sample_cost,
 };
 
 /// Two candidates refitted together.
@@ -38,8 +38,7 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
     if dataset.excess() < NOTHING_LEFT || !apart.rates {
         return Ok(None);
     }
-    let left = |fit| evaluate(&dataset.tracks, &fitted.fit.hypothesis, fit, Role::Fit, Window::Whole, None);
-    let before = left(&fitted.fit.starts);
+    let before = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
     let causes: Vec<Candidate> = candidates(dataset, &fitted.fit.hypothesis, &before, &before)
         .into_iter()
         .filter(|c| c.refine.is_none() && apart.can_be_named(c) && c.id.description().onsets.is_empty())
@@ -68,12 +67,14 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
     if matches!(balances, [Some(before), Some(after)] if after > REFUTED * before) {
         return Ok(None);
     }
+    let before_it = Before::of(dataset, &fitted.fit);
     let next = fit_with_ring_downs(dataset, &best.fit.hypothesis)?;
     let after = on_heldout(dataset, &next.fit);
-    if after.mean_square() > (NOTHING_LEFT * floor(dataset, &next.fit)).powi(2) {
+    let is_noise = after.mean_square() <= (NOTHING_LEFT * floor(dataset, &next.fit)).powi(2);
+    if !is_noise || !before_it.is_improved_by(after.mean_square()) {
         return Ok(None);
     }
-    let rms = [heldout(dataset, &fitted.fit), after.mean_square()].map(|square| square.sqrt().to_degrees());
+    let rms = [before_it.mean_square, after.mean_square()].map(|square| square.sqrt().to_degrees());
     let step = |candidate: &Candidate| Step {
         id: candidate.id,
         origin: Origin::Discovered,

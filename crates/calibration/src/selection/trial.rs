@@ -1,16 +1,31 @@
 //! A candidate on trial: the model refitted with it, what that gains, and what it leaves of data that was not fitted.
 
-use cvg_model::effects::Role as ParameterRole;
+use cvg_model::effects::{Role as ParameterRole, Stage};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
+use crate::error::Refusal;
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, fit};
-use crate::estimation::joint_fit::{Dataset, Fitted};
+use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;
+
+/// Gain in log-likelihood (×2, after the price of parameters and of the search) that a new effect must bring.
+pub(super) const LEAST_GAIN: f64 = 12.0;
+/// By how much it must beat a rival of the library to be told apart from it.
+pub(super) const LEAST_LEAD: f64 = 8.0;
+/// The share of the held-out mean square that it must remove.
+pub(super) const LEAST_HELDOUT_GAIN: f64 = 0.05;
+/// What it removes from the held-out error must be this large beside the noise floor: smaller ones are often what a
+/// larger effect leaves when its place in the chain of the readout is not quite the library's.
+const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
+/// A cause under which the energy balance leaves this many times the mean square is refuted.
+pub(super) const REFUTED: f64 = 1.5;
+/// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
+pub(super) const NOTHING_LEFT: f64 = 1.2;
 
 /// A candidate after its refit.
 #[derive(Debug, Clone)]
@@ -94,6 +109,34 @@ pub(super) fn sample_cost(evaluation: &Evaluation) -> f64 {
     inflation(&correlation, evaluation.errors().count())
 }
 
+/// Trials leave the runs as their own fits had them: fits them again as they were.
+pub(super) fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), Refusal> {
+    if dataset.disturbed(&fitted.fit) {
+        *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
+    }
+    Ok(())
+}
+
+/// What was left of the held-out samples before a step, and how much of it has to go.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Before {
+    /// held-out mean square, rad²
+    pub(super) mean_square: f64,
+    least_removed: f64,
+}
+
+impl Before {
+    pub(super) fn of(dataset: &Dataset, fit: &Fit) -> Self {
+        let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, fit)).powi(2);
+        Self { mean_square: heldout(dataset, fit), least_removed }
+    }
+
+    /// Whether what is left after a step is less by enough to name what it added.
+    pub(super) fn is_improved_by(self, after: f64) -> bool {
+        after <= (1.0 - LEAST_HELDOUT_GAIN) * self.mean_square && self.mean_square - after >= self.least_removed
+    }
+}
+
 /// White part of the held-out error, rad.
 pub(super) fn floor(dataset: &Dataset, fit: &Fit) -> f64 {
     evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
@@ -107,4 +150,37 @@ pub(super) fn on_heldout(dataset: &Dataset, fit: &Fit) -> Evaluation {
 /// Held-out mean square of a fit, rad².
 pub(super) fn heldout(dataset: &Dataset, fit: &Fit) -> f64 {
     on_heldout(dataset, fit).mean_square()
+}
+
+/// What the fitted runs can tell apart.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Distinguishable {
+    /// runs at two or more rates, or in both directions
+    pub(super) rates: bool,
+    /// at two or more speeds
+    speeds: bool,
+    /// the loops' commands and the quadrature they left were recorded, which move the pattern too
+    mechanics: bool,
+}
+
+impl Distinguishable {
+    pub(super) fn on(dataset: &Dataset) -> Self {
+        Self {
+            rates: dataset.tracks_differ(),
+            speeds: dataset.speeds_differ(),
+            mechanics: dataset.tracks.iter().all(|t| t.track.records_the_loops()),
+        }
+    }
+
+    /// Whether these runs could show a candidate to be a cause, and not only describe what is left.
+    pub(super) fn can_be_named(self, candidate: &Candidate) -> bool {
+        let d = candidate.id.description();
+        // at one speed a delay is a step between the directions
+        let delayed = d.scaling.rate > 0 && !self.speeds;
+        // without the loops' record what they do to the pattern looks like mechanics
+        let driven = d.stage == Stage::Mechanics && !self.mechanics;
+        // and a line in time may be one of the table or of what turns with it
+        let in_time = d.parameters.iter().any(|p| matches!(p.role, ParameterRole::Located(_))) && !self.speeds;
+        d.explains(&candidate.values) && !delayed && !driven && !in_time
+    }
 }
