@@ -7,7 +7,7 @@ use statrs::function::erf::erfc;
 
 use super::samples::span;
 use super::table_fit::{Sample, TableFit, only_phase};
-use crate::estimation::statistics::median;
+use crate::estimation::statistics::{lower_quartile, median};
 
 /// False-alarm probability over all lines tried.
 const FALSE_ALARM: f64 = 0.01;
@@ -17,7 +17,8 @@ const HIGHEST: u32 = 128;
 const FEWEST: usize = 8;
 
 /// The strongest line of what a table leaves, if it is no accident. Lines go up to that which the spacing of stations
-/// resolves, and that one is included: left out, its aliases would stand in for it.
+/// resolves, and that one is included: left out, its aliases would stand in for it. Where stations were left out, the
+/// lower quartile of their distances is still the spacing.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small positive counts, saturating")]
 pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_turn: f64) -> Option<u32> {
     let reference: Vec<f64> = samples.iter().map(|s| s.reference).collect();
@@ -26,7 +27,7 @@ pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_t
     }
     let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
     let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
-    let resolved = std::f64::consts::PI / median(&mut steps).max(1e-12) + 0.01;
+    let resolved = std::f64::consts::PI / lower_quartile(&mut steps).max(1e-12) + 0.01;
     let from = (fitted.shape.order as f64 * cycles_per_turn).floor() as u32 + 1;
     let tried: Vec<u32> = (from..=HIGHEST.min(resolved as u32)).filter(|n| !fitted.shape.lines.contains(n)).collect();
     if tried.len() < FEWEST {
@@ -48,4 +49,30 @@ fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {
         (c + e * cos, s + e * sin)
     });
     c * c + s * s
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::super::table_fit::{Motion, Shape};
+    use super::*;
+    use crate::estimation::statistics::remembered;
+    use crate::model::angle_table::Form;
+
+    /// Stations 5° apart of which every third is left out, and a line of 36 per turn, which is half their number.
+    #[test]
+    fn a_line_at_the_spacing_of_stations_is_found_and_not_its_alias_where_some_are_left_out() {
+        let noise = remembered(0.0, 72, 7);
+        let stations = (0..72).filter(|i| i % 3 != 1);
+        let samples: Vec<Sample> = stations
+            .map(|i| {
+                let reference = (5.0 * f64::from(i)).to_radians();
+                let error = 3e-3 * (36.0 * reference).cos() + 2e-4 * noise[i as usize];
+                Sample { theta: reference + error, error, reference, rate: 1.0, acceleration: 0.0, run: 0 }
+            })
+            .collect();
+        let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![], free_gain: false };
+        let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
+        assert_eq!(strongest_line(&samples, &fitted, 1.0), Some(36));
+    }
 }
