@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use cvg_calibration::recording::{Campaign, Instrument, Recording, Reference, Role, Run};
 use cvg_calibration::report::Status;
-use cvg_calibration::{Options, compensate, identify};
+use cvg_calibration::{Identification, Options, compensate, identify};
 use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, run, sensor};
 
 /// One turn there and back at 60 deg/s with ramps, 100 samples/s: time, angle of the table in deg, rate in deg/s.
@@ -131,11 +131,48 @@ fn encoder_at_stations(held: bool, seed: u64) -> Run {
 fn a_hundred_and_thirty_three_stations_are_enough_for_an_encoder() {
     let i = identified(sensor(vec![encoder_at_stations(false, 1), encoder_at_stations(true, 2)]));
     assert!(held_out(&i) < 1.5 * 0.012, "{}° left of 0.012° noise: {:#?}", held_out(&i), i.report.effects);
-    let lines: Vec<f64> =
-        i.report.effects.iter().filter(|e| e.id == "table-harmonic").map(|e| e.parameters[0].value).collect();
+    let lines = lines(&i);
     assert!(lines.contains(&50.0) && lines.contains(&100.0), "{lines:?}");
     // what belongs to the motor is not replayed
     assert!(i.calibration.hypothesis.members.is_empty() && i.calibration.hypothesis.angle_table.is_some());
+}
+
+/// A resolver of eight pole pairs, off centre by 0.5° of its shaft, over so many turns; its angle is that of the poles.
+fn eccentric_poles(seed: u64, role: Role, turns: f64, eccentricity: f64, memory: f64) -> Run {
+    let (mut noise, mut last, rows) = (Noise::new(seed), 0.0, 3000);
+    let table: Vec<f64> = (0..rows).map(|i| 360.0 * turns * f64::from(i) / f64::from(rows)).collect();
+    let theta = |a: &f64| {
+        last = memory * last + (1.0 - memory * memory).sqrt() * noise.sample();
+        let of_poles = 8.0 * (a + eccentricity * (a.to_radians() + 0.7).sin());
+        of_poles + 0.6 * (of_poles.to_radians() + 0.2).cos() + 0.1 * last
+    };
+    let recording = Recording {
+        t_s: (0..rows).map(|i| f64::from(i) * 0.01).collect(),
+        theta_deg: Some(table.iter().map(theta).collect()),
+        table_deg: Some(table),
+        ..Recording::default()
+    };
+    run("poles.csv", role, recording)
+}
+
+fn lines(i: &Identification) -> Vec<f64> {
+    i.report.effects.iter().filter(|e| e.id == "table-harmonic").map(|e| e.parameters[0].value).collect()
+}
+
+#[test]
+fn pole_pairs_off_centre_show_once_a_turn_of_the_shaft() {
+    for seed in 0..3 {
+        let runs = [(seed, Role::Fit), (seed + 100, Role::Holdout)];
+        let poles = |turns: f64, eccentricity, memory| {
+            let runs = runs.map(|(seed, role)| eccentric_poles(seed, role, turns, eccentricity, memory));
+            identified(Campaign { angular_gain: Some(8.0), ..sensor(runs.into()) })
+        };
+        let i = poles(3.0, 0.5, 0.0);
+        assert!(held_out(&i) < 1.05 * 0.1, "{}° left of 0.1° noise: {:#?}", held_out(&i), i.report.effects);
+        assert_eq!(lines(&i), [1.0], "seed {seed}");
+        // slow noise is none, and within one turn it could be a drift
+        assert!(lines(&poles(3.0, 0.0, 0.98)).is_empty() && lines(&poles(1.2, 0.5, 0.0)).is_empty(), "seed {seed}");
+    }
 }
 
 #[test]

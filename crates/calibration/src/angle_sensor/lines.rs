@@ -15,6 +15,13 @@ const FALSE_ALARM: f64 = 0.01;
 const HIGHEST: u32 = 128;
 /// Fewest lines to tell noise from.
 const FEWEST: usize = 8;
+/// The first harmonics of the sensor's period are left to the table, even where it was chosen shorter.
+const OF_EVERY_TABLE: usize = 4;
+/// Lines that are nearer than this, per turn, are one.
+const ONE_LINE: f64 = 0.25;
+/// A line slower than the sensor's period, as the eccentricity of many pole pairs makes, has to come round again: within one
+/// turn it is no more than a drift.
+const TURNS_OF_A_SLOW_LINE: f64 = 1.75;
 
 /// The strongest line of what a table leaves, if it is no accident. Lines go up to that which the spacing of stations
 /// resolves, and that one is included: left out, its aliases would stand in for it. Where stations were left out, the
@@ -28,8 +35,12 @@ pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_t
     let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
     let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
     let resolved = std::f64::consts::PI / lower_quartile(&mut steps).max(1e-12) + 0.01;
-    let from = (fitted.shape.order as f64 * cycles_per_turn).floor() as u32 + 1;
-    let tried: Vec<u32> = (from..=HIGHEST.min(resolved as u32)).filter(|n| !fitted.shape.lines.contains(n)).collect();
+    let repeats = span(&reference) > TURNS_OF_A_SLOW_LINE * std::f64::consts::TAU;
+    let tried: Vec<u32> = (1..=HIGHEST.min(resolved as u32))
+        .filter(|n| !fitted.shape.lines.contains(n))
+        .filter(|n| repeats || f64::from(*n) > cycles_per_turn)
+        .filter(|n| !belongs_to_table(*n, fitted.shape.order, cycles_per_turn))
+        .collect();
     if tried.len() < FEWEST {
         return None;
     }
@@ -41,6 +52,13 @@ pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_t
     let alone = if one_phase { erfc((0.5 * ratio).sqrt()) } else { (-ratio).exp() };
     let by_chance = -(-alone).ln_1p() * tried.len() as f64;
     (-(-by_chance).exp_m1() < FALSE_ALARM).then(|| tried[at])
+}
+
+/// Whether a line is a harmonic of the sensor's period that a table of so many harmonics holds, or could.
+fn belongs_to_table(n: u32, order: usize, cycles_per_turn: f64) -> bool {
+    let harmonic = (f64::from(n) / cycles_per_turn).round();
+    let apart = (f64::from(n) - harmonic * cycles_per_turn).abs();
+    harmonic >= 1.0 && apart < ONE_LINE && harmonic <= order.max(OF_EVERY_TABLE) as f64
 }
 
 fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {

@@ -16,6 +16,10 @@ const ENOUGH_ROWS: usize = 100_000;
 /// What an ellipse may leave of the radius, rms, where nothing else tells the readout: engineering choice.
 const LARGEST_RADIUS_ERROR: f64 = 0.25;
 
+/// An angle that follows its reference is off by less than this share of what an angle at random is, a period over √12:
+/// engineering choice.
+const FOLLOWING: f64 = 0.5;
+
 /// Whether there is an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
@@ -108,7 +112,8 @@ impl SensorModel {
             predicted = alone.rms();
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
-        let helps = predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
+        let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();
+        let helps = follows && predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
         let model =
             Self { sensor, outcome: Outcome::Answered, readout, table, predicted, predicted_raw, by_radius: false };
         Some(if helps { model } else { model.neutral(runs) })
