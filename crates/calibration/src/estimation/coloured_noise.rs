@@ -17,6 +17,8 @@ const DIFFUSE: f64 = 1e10;
 /// How fast commands that were not recorded precess a pattern steadily, rad/s: tan(θ_error)/τ for a force that is wrong by
 /// 10 mrad at every angle and τ = 10 s.
 pub(crate) const DRIFT_RAD_S: f64 = 1e-3;
+/// Share by which intervals differ that are the same but for the rounding of their times.
+const SAME_INTERVAL: f64 = 1e-9;
 /// Samples of a block whose whitened scores are summed before they are squared.
 const BLOCK: usize = 64;
 
@@ -121,6 +123,8 @@ pub(crate) struct Filter {
     // between samples
     couplings: Vec<f64>,
     kept: Vec<f64>,
+    /// of every pair of states
+    kept_together: Vec<f64>,
     kept_for_s: f64,
     seen: Vec<f64>,
     whitened: Vec<f64>,
@@ -167,6 +171,7 @@ impl Filter {
             means,
             couplings: vec![0.0; s],
             kept: vec![1.0; s],
+            kept_together: vec![1.0; s * s],
             kept_for_s: 0.0,
             seen: vec![0.0; s],
             whitened: vec![0.0; columns],
@@ -193,9 +198,12 @@ impl Filter {
     /// The states to the next sample.
     fn propagate(&mut self, o: &Observation<'_>) {
         let (s, columns) = (self.states.len(), self.n + 1);
-        if o.interval_s != self.kept_for_s {
+        if (o.interval_s - self.kept_for_s).abs() > SAME_INTERVAL * o.interval_s {
             for (kept, state) in self.kept.iter_mut().zip(&self.states) {
                 *kept = (-o.interval_s / state.memory_s).exp();
+            }
+            for (row, own) in self.kept_together.chunks_exact_mut(s).zip(&self.kept) {
+                row.iter_mut().zip(&self.kept).for_each(|(together, other)| *together = own * other);
             }
             self.kept_for_s = o.interval_s;
         }
@@ -224,18 +232,16 @@ impl Filter {
             }
         }
         // … and forget
-        for i in 1..s {
-            let keep = self.kept[i];
-            if keep < 1.0 {
-                for m in &mut self.means[i * columns..(i + 1) * columns] {
-                    *m *= keep;
-                }
-                for j in 0..s {
-                    self.covariance[i * s + j] *= keep;
-                    self.covariance[j * s + i] *= keep;
-                }
-                self.covariance[i * s + i] += self.states[i].variance * (1.0 - keep * keep);
+        for ((mean, keep), state) in self.means.chunks_exact_mut(columns).zip(&self.kept).zip(&self.states) {
+            if state.memory_s.is_finite() {
+                mean.iter_mut().for_each(|m| *m *= keep);
             }
+        }
+        for (p, kept) in self.covariance.iter_mut().zip(&self.kept_together) {
+            *p *= kept;
+        }
+        for (i, (state, keep)) in self.states.iter().zip(&self.kept).enumerate() {
+            self.covariance[i * s + i] += state.variance * (1.0 - keep * keep);
         }
         self.covariance[0] += self.walk * o.interval_s;
     }
