@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 use super::root::Root;
 
 /// What has to be among the properties of every harness, or the model was not what it should be.
-const ALWAYS: [&str; 3] = ["panic", "access out of bounds", "cover: the end"];
+const ALWAYS: [&str; 3] = ["panic", BEYOND, "cover: the end"];
+/// The property that every load and every store is within the memory: of the stack, that it does not run over.
+const BEYOND: &str = "access out of bounds";
 /// Loops without `#[kani::unwind]` run at most so often.
 pub(crate) const UNWIND: &str = "16";
 /// The solver of harnesses without `#[kani::solver]`: on products of floats far quicker than the other.
@@ -62,6 +64,8 @@ pub(crate) enum Verdict {
     Vacuous(Vec<String>),
     /// loops were cut short
     Unwound,
+    /// memory that is not there is written or read: the claim is not even about what happens
+    Beyond,
     /// neither, and why
     Unknown(String),
 }
@@ -85,6 +89,9 @@ impl Answer {
         let unwound = failed.iter().any(|text| text.contains("unwinding assertion"));
         if unwound {
             return Verdict::Unwound;
+        }
+        if !failed.is_empty() && failed.iter().all(|text| *text == BEYOND) {
+            return Verdict::Beyond;
         }
         if failed.len() > usize::from(panics) {
             return Verdict::Unknown(format!("{failed:?}"));
@@ -278,6 +285,11 @@ mod tests {
         properties[0].1 = false;
         properties[1].1 = false;
         assert!(matches!(answer(&properties).verdict(&["here"]), Verdict::Unknown(_)));
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_neither_proof_nor_refutation() {
+        assert_eq!(changed("access out of bounds", false).verdict(&["here"]), Verdict::Beyond);
     }
 
     const OUTPUT: &str = "CBMC version 6.6.0\n\n** Results:\nhost.c function wasm_rt_trap\n\

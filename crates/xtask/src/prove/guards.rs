@@ -266,3 +266,56 @@ pub fn proof_guard_ends_of_the_range_are_kept() {
 pub fn twin_guard_ends_of_the_range_are_kept() {
     ends_of_the_range_are_kept(1.0);
 }
+
+fn a_stack_holds<const BYTES: usize>() {
+    let value: u8 = kani::any();
+    kani::cover!(value == 3, "a value");
+    let mut all = [0_u8; BYTES];
+    black_box(&mut all)[BYTES - 1] = value;
+    assert!(black_box(&all)[BYTES - 1] == value);
+}
+
+/// What fits the stack is held there.
+#[kani::proof]
+#[kani::unwind(400)]
+pub fn proof_guard_a_stack_ends() {
+    a_stack_holds::<64>();
+}
+
+/// What does not fit is refuted: a stack that runs over writes into nothing else.
+#[kani::proof]
+#[kani::should_panic]
+#[kani::unwind(400)]
+pub fn twin_guard_a_stack_ends() {
+    a_stack_holds::<6000>();
+}
+
+fn copies_of_any_length_are_whole(added: u8) {
+    let from: [u8; 4] = kani::any();
+    let mut to = [0_u8; 4];
+    let n: usize = kani::any_where(|n| *n >= 1 && *n <= 4);
+    kani::cover!(n == 3, "an odd length");
+    kani::cover!(n == 4, "all of it");
+    let (source, place) = (black_box(&from), black_box(&mut to));
+    for (place, source) in place.iter_mut().zip(source).take(black_box(n)) {
+        *place = *source;
+    }
+    let copied = black_box(&to);
+    for k in 0..4 {
+        assert!(copied[k] == if k < n { from[k].wrapping_add(added) } else { 0 });
+    }
+}
+
+/// A copy whose length nobody knows beforehand is whole and ends where it has to.
+#[kani::proof]
+#[kani::unwind(40)]
+pub fn proof_guard_copies_of_any_length_are_whole() {
+    copies_of_any_length_are_whole(0);
+}
+
+#[kani::proof]
+#[kani::should_panic]
+#[kani::unwind(40)]
+pub fn twin_guard_copies_of_any_length_are_whole() {
+    copies_of_any_length_are_whole(1);
+}

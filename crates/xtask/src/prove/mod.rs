@@ -28,6 +28,8 @@ const LIMIT_S: u64 = 800;
 const MOST_S: f64 = 2400.0;
 /// The twin of this guard cuts its loop short, which is what has to be seen.
 const CUT_SHORT: &str = "twin_guard_loops_are_counted";
+/// The twin of this guard asks for more than the stack has, which is what has to be seen.
+const RUN_OVER: &str = "twin_guard_a_stack_ends";
 
 /// A harness and where it is.
 #[derive(Clone, Debug)]
@@ -333,7 +335,11 @@ fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> Pro
     let covers: Vec<_> = proof.covers.iter().map(String::as_str).collect();
     let verdict = answer.verdict(&covers);
     let twin_verdict = twin.verdict(&covers);
-    let rejected = if twin_name == CUT_SHORT { Verdict::Unwound } else { Verdict::Refuted };
+    let rejected = match twin_name {
+        CUT_SHORT => Verdict::Unwound,
+        RUN_OVER => Verdict::Beyond,
+        _ => Verdict::Refuted,
+    };
     let mut details = Vec::new();
     if verdict != Verdict::Proved {
         details.push(format!("{verdict:?}"));
