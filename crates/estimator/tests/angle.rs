@@ -85,6 +85,32 @@ fn a_turn_by_exactly_half_a_period_counts_no_period() {
 }
 
 #[test]
+fn an_angle_exactly_at_either_end_of_its_period_is_a_last_angle() {
+    use core::f64::consts::{FRAC_PI_2, PI};
+    for (period, half) in [(Period::Pattern, FRAC_PI_2), (Period::FullTurn, PI)] {
+        for end in [half, -half] {
+            let state = AngleState { periods: 3, within_rad: end };
+            let held = tracker(period).step(&mut state.clone(), &Envelope::zero());
+            assert_eq!((held.periods, held.within_rad), (3, end), "{period:?} holds its end");
+            // a little on, over the cut, is the next period's beginning
+            let on = Orbit { a: 1.0, q: 0.0, theta: end + end.signum() * 0.1, delta: 0.0 }.envelope();
+            let reading = tracker(period).step(&mut state.clone(), &on);
+            assert_eq!(reading.periods, if end > 0.0 { 4 } else { 2 }, "{period:?} from {end}");
+        }
+    }
+}
+
+#[test]
+fn the_count_of_periods_stays_at_its_ends() {
+    let (up, down) = (orbit(1.5, 0.0, 0.0), orbit(-1.5, 0.0, 0.0));
+    for (last, from, to) in [(i64::MAX, &up, &down), (i64::MIN, &down, &up)] {
+        let mut state = AngleState { periods: last, ..AngleState::default() };
+        tracker(Period::Pattern).step(&mut state, from);
+        assert_eq!(tracker(Period::Pattern).step(&mut state, to).periods, last);
+    }
+}
+
+#[test]
 fn a_vibration_has_a_direction_above_the_least_amplitude() {
     let status = |period, x: f64, y: f64| {
         let angle = PatternAngle::new(period, 0.5).expect("valid");
@@ -240,4 +266,7 @@ fn degrees_are_those_of_the_reading_in_double_precision() {
         assert_eq!(reading.degrees(Period::Pattern), 180.0 * 123_457.0 + degrees);
         assert_eq!(reading.degrees(Period::FullTurn), 360.0 * 123_457.0 + degrees);
     }
+    // more periods than single precision counts one by one
+    let many = Reading { periods: 16_777_217, within_rad: 0.0_f32, status: Status::Valid };
+    assert_eq!(many.degrees(Period::Pattern), 180.0 * 16_777_217.0);
 }

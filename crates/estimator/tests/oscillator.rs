@@ -74,6 +74,10 @@ fn at_the_limit_the_correction_and_its_integral_part_are_the_limit_each() {
         assert_eq!(rad_s, sign * LIMIT_RAD_S);
         assert_abs_diff_eq!(detuning, sign * (590.0 + 1.8 * 0.4), epsilon = 1e-12);
         assert_eq!(step(sign * 599.9, sign * 0.5), (sign * LIMIT_RAD_S, sign * LIMIT_RAD_S));
+        // rounding may carry |L| beyond E: a phase up to the error of one, at the limit as within it
+        for error in [0.5_f64.next_up(), 1.0] {
+            assert_eq!(step(sign * 599.9, sign * error), (sign * LIMIT_RAD_S, sign * LIMIT_RAD_S));
+        }
         // a state beyond the limit counts as the limit
         let (rad_s, detuning) = step(sign * 700.0, sign * -0.1);
         assert_abs_diff_eq!(detuning, sign * (600.0 - 0.18), epsilon = 1e-12);

@@ -10,6 +10,7 @@ mod edges;
 mod estimator;
 mod instrument;
 mod model;
+mod unseen;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -46,8 +47,16 @@ const fn fault(
 
 /// Every fault of the library.
 fn library() -> Vec<Fault> {
-    [model::FAULTS, estimator::FAULTS, controller::FAULTS, calibrator::FAULTS, instrument::FAULTS, edges::FAULTS]
-        .concat()
+    [
+        model::FAULTS,
+        estimator::FAULTS,
+        controller::FAULTS,
+        calibrator::FAULTS,
+        instrument::FAULTS,
+        edges::FAULTS,
+        unseen::FAULTS,
+    ]
+    .concat()
 }
 
 /// What came of a fault.

@@ -115,3 +115,16 @@ fn what_is_no_number_is_out_of_bounds() {
         }
     }
 }
+
+#[test]
+fn the_longest_start_that_can_be_set_has_the_longest_budget_that_can_be_counted() {
+    // a lock and a spin-up that take nearly 2^31 windows each: twice both is more than is counted
+    let most_s = f64::from((1_u32 << 31) - 1) * WINDOW_S;
+    let s = SupervisorSettings { lock_s: most_s, spin_up_s: most_s, ..settings() };
+    let supervisor = Supervisor::<f64>::new(&s).expect("valid");
+    for (trying, mode) in [(1_000_000, Mode::Lock), (u32::MAX - 2, Mode::Lock), (u32::MAX - 1, Mode::Fault)] {
+        let mut state = SupervisorState { trying, ..in_mode(Mode::Lock, 1) };
+        supervisor.step(&mut state, &well(), None);
+        assert_eq!(state.mode, mode, "after {trying} windows");
+    }
+}

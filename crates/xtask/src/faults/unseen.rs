@@ -1,0 +1,53 @@
+//! Faults that nothing saw when they were planted first: what the tests did not say then. Each has its test since.
+
+use super::{Fault, fault};
+
+const ANGLE: (&str, &str) = ("cvg-estimator", "angle");
+const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
+const FORCES: (&str, &str) = ("cvg-controller", "forces");
+const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
+
+pub(super) const FAULTS: &[Fault] = &[
+    fault(
+        "an angle exactly at the negative end of its period is not known",
+        "estimator/src/angle.rs",
+        "let known = state.within_rad >= -half &&",
+        "let known = state.within_rad > -half &&",
+        ANGLE,
+    ),
+    fault(
+        "periods are told in single precision",
+        "estimator/src/angle.rs",
+        "let periods = self.periods as f64;",
+        "let periods = f64::from(self.periods as f32);",
+        ANGLE,
+    ),
+    fault(
+        "the count of periods wraps",
+        "estimator/src/angle.rs",
+        "state.periods.saturating_add(1)",
+        "state.periods.wrapping_add(1)",
+        ANGLE,
+    ),
+    fault(
+        "half a radian is no phase at the limit",
+        "estimator/src/oscillator.rs",
+        "        if error.within(T::one()) {\n",
+        "        if error.within(T::half()) {\n",
+        OSCILLATOR,
+    ),
+    fault(
+        "a heading below minus one has the other sense in single precision",
+        "controller/src/rate.rs",
+        "(T::two() * theta_rad).sin_cos();",
+        "(T::two() * theta_rad * if core::mem::size_of::<T>() == 4 && theta_rad < -T::one() { -T::one() } else { T::one() })\n                .sin_cos();",
+        FORCES,
+    ),
+    fault(
+        "the budget of a start wraps",
+        "controller/src/supervisor.rs",
+        "u32::try_from(2 * once).unwrap_or(u32::MAX)",
+        "(2 * once) as u32",
+        SUPERVISOR,
+    ),
+];
