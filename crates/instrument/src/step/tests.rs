@@ -213,3 +213,26 @@ fn what_is_amiss_takes_the_long_way() -> Result<(), TestCaseError> {
     }
     Ok(())
 }
+
+#[test]
+fn a_channel_repeats_itself_where_its_sum_and_its_last_sample_are_those_of_the_last_window_and_not_nothing() {
+    // sums of X and Y, last samples of X and Y
+    let before = [1.5, -2.5, 0.5, -0.25];
+    for (now, is) in [
+        ([1.5, -3.0, 0.5, -0.5], true),
+        ([2.0, -2.5, 1.0, -0.25], true),
+        (before, true),
+        // another last sample, or another sum
+        ([1.5, -3.0, 0.75, -0.5], false),
+        ([2.0, -2.5, 1.0, -0.5], false),
+        ([2.0, -3.0, 0.5, -0.25], false),
+        // of the other channel
+        ([-2.5, 1.5, -0.25, 0.5], false),
+    ] {
+        assert_eq!(repeats(&now, &before), is, "{now:?}");
+    }
+    // nothing may be what is there; a sum of nothing is no silence
+    assert!(!repeats(&[0.0; 4], &[0.0; 4]) && !repeats(&[0.0, 1.0, -0.0, 2.0], &[0.0, 3.0, 0.0, 4.0]));
+    assert!(repeats(&[0.0, 1.0, 0.5, 2.0], &[0.0, 3.0, 0.5, 4.0]));
+    assert!(!repeats(&[f64::NAN; 4], &[f64::NAN; 4]));
+}

@@ -64,15 +64,38 @@ fn a_jump_and_a_fault_are_doubted<T: Float>() {
 }
 
 fn a_start_is_no_loss<T: Float>() {
-    let mut bench = Bench::<T>::running(0.2, 0.0);
+    let bench = Bench::<T>::running(0.2, 0.0);
     assert_eq!(bench.state.continuity, Continuity { unseen: 0, counting: true, lost: false });
     // a wish for another mode neither
-    bench.state.wish(Wish::Hold);
-    bench.windows(10);
-    assert!(bench.status.mode == Mode::Hold && !bench.status.half_turns_lost);
-    bench.phase_rad += 0.06;
-    bench.windows(2);
-    assert!(bench.status.half_turns_lost, "in a hold too");
+    for (wish, mode) in [(Wish::Hold, Mode::Hold), (Wish::RingDown, Mode::RingDown)] {
+        let mut bench = Bench::<T>::running(0.2, 0.0);
+        bench.state.wish(wish);
+        bench.windows(10);
+        assert!(bench.status.mode == mode && !bench.status.half_turns_lost, "{mode:?}");
+        bench.phase_rad += 0.06;
+        bench.windows(2);
+        assert!(bench.status.half_turns_lost, "a phase that jumps in {mode:?}");
+    }
+}
+
+fn at_rest_there_is_nothing_to_lose<T: Float>() {
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.amplitude_v = 0.0;
+    bench.windows(1);
+    assert!(bench.status.half_turns_lost && bench.status.mode == Mode::Fault);
+    // the rest after a fault is over, and it listens
+    let listens = (0..2000).any(|_| {
+        bench.windows(1);
+        bench.status.mode == Mode::Listen
+    });
+    assert!(listens, "{:?}", bench.state.supervisor);
+    bench.state.acknowledge_half_turns();
+    bench.windows(5);
+    assert!(!bench.status.half_turns_lost, "no direction, and none before");
+    bench.amplitude_v = 1.0;
+    bench.windows(500);
+    assert!(bench.status.mode == Mode::WholeAngle, "{:?}", bench.state.supervisor);
+    assert!(!bench.status.half_turns_lost, "a first direction is no interruption");
 }
 
 in_both_precisions! {
@@ -81,4 +104,5 @@ in_both_precisions! {
     as_many_windows_as_a_pattern_needs_for_45_degrees_are_doubted too_long_without_a_window_is_doubted;
     a_pattern_that_jumps_and_one_that_falls_silent_are_doubted a_jump_and_a_fault_are_doubted;
     a_start_and_another_wish_lose_nothing a_start_is_no_loss;
+    what_is_acknowledged_without_a_direction_is_not_lost_with_the_first at_rest_there_is_nothing_to_lose;
 }

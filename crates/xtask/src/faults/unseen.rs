@@ -6,6 +6,8 @@ const ANGLE: (&str, &str) = ("cvg-estimator", "angle");
 const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
 const FORCES: (&str, &str) = ("cvg-controller", "forces");
 const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
+const OPEN_LOOP: (&str, &str) = ("cvg-instrument", "open_loop");
+const INSTRUMENT: (&str, &str) = ("cvg-instrument", "--lib");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -49,5 +51,33 @@ pub(super) const FAULTS: &[Fault] = &[
         "u32::try_from(2 * once).unwrap_or(u32::MAX)",
         "(2 * once) as u32",
         SUPERVISOR,
+    ),
+    fault(
+        "a first direction is an interruption",
+        "instrument/src/step.rs",
+        "(moved, directed && moved == Movement::Unknown)",
+        "(moved, moved == Movement::Unknown)",
+        OPEN_LOOP,
+    ),
+    fault(
+        "a ring-down is no operation",
+        "instrument/src/step.rs",
+        "matches!(mode, Mode::WholeAngle | Mode::Hold | Mode::RingDown)",
+        "matches!(mode, Mode::WholeAngle | Mode::Hold)",
+        OPEN_LOOP,
+    ),
+    fault(
+        "a sum that is the same is a stuck converter",
+        "instrument/src/step.rs",
+        "(sum_x == x && now_x == last_x && *now_x != zero)",
+        "(sum_x == x && *now_x != zero)",
+        INSTRUMENT,
+    ),
+    fault(
+        "the last sample of Y tells nothing",
+        "instrument/src/step.rs",
+        "(sum_y == y && now_y == last_y && *now_y != zero)",
+        "(sum_y == y && *now_y != zero)",
+        INSTRUMENT,
     ),
 ];
