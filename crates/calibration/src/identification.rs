@@ -3,7 +3,7 @@
 use cvg_model::effects::EffectId;
 use nalgebra::DMatrix;
 
-use crate::angle_sensor;
+use crate::angle_sensor::{self, curve::Curve};
 use crate::carrier;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::influences::shares;
@@ -76,6 +76,8 @@ pub struct Figures {
     pub bias: Vec<BiasCurve>,
     /// ring-downs: name, angle in deg, amplitude over time
     pub ring_downs: Vec<RingDown>,
+    /// of an angle sensor, what its two channels draw
+    pub channels: Option<Curve>,
 }
 
 /// Angle error of one held-out stretch.
@@ -499,5 +501,5 @@ fn figures(
             }
         })
         .collect();
-    Figures { bias, ring_downs }
+    Figures { bias, ring_downs, channels: None }
 }

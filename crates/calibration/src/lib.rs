@@ -46,7 +46,7 @@ pub mod report;
 mod selection;
 mod survey;
 
-pub use angle_sensor::reference_free::Curve;
+pub use angle_sensor::curve::Curve;
 pub use cvg_recording as recording;
 pub use diagnostics::allan;
 pub use diagnostics::evaluate::ErrorSize;

@@ -1,8 +1,8 @@
 //! What a campaign tells, whatever it is of: an identification where there is an angle and what it should be, and a survey
 //! where there is not.
 
-use crate::angle_sensor::likeness;
-use crate::angle_sensor::reference_free::{self, Curve};
+use crate::angle_sensor::curve::Curve;
+use crate::angle_sensor::{likeness, reference_free};
 use crate::diagnostics::at_rest;
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;

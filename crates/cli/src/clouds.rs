@@ -4,6 +4,7 @@ use cvg_calibration::{BiasCurve, Identification};
 
 use crate::Failure;
 use crate::figure::{BLUE, GREEN, Series, VERMILLION, plot};
+use crate::report::name_of_angle;
 
 /// Some `wanted` of `total` points. Every so many would beat with the turns of the pattern and draw stripes that are not
 /// in the data; steps of the golden ratio are in step with nothing.
@@ -26,7 +27,11 @@ pub(crate) fn bias_svg(identified: &Identification, points: usize, with_raw: boo
         cloud("declared", BLUE, |c| &c.declared_deg),
         cloud("discovered", GREEN, |c| &c.discovered_deg),
     ];
-    plot("pattern angle [deg]", "angle error [deg]", if with_raw { &series } else { &series[1..] })
+    plot(
+        &format!("{} [deg]", name_of_angle(identified)),
+        "angle error [deg]",
+        if with_raw { &series } else { &series[1..] },
+    )
 }
 
 #[cfg(test)]

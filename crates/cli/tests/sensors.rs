@@ -243,3 +243,48 @@ fn what_is_recorded_in_counts_is_said_in_counts() {
         assert_eq!(calibration.contains(&format!("readout_unit = \"{unit}\"")), unit != "V", "{calibration}");
     }
 }
+
+/// The page of a sensor's identification.
+fn page(folder: &TempDir, file: &Path) -> String {
+    let out = folder.path().join("results");
+    let arguments: [&OsStr; 5] =
+        ["identify".as_ref(), file.as_ref(), "--sensor".as_ref(), "--out".as_ref(), out.as_ref()];
+    cvg_ok(&arguments);
+    fs::read_to_string(out.join("report.html")).unwrap()
+}
+
+#[test]
+fn the_first_figure_of_two_channels_is_what_they_draw_with_a_reference_as_well() {
+    let folder = TempDir::new().unwrap();
+    let page = page(&folder, &written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, true)));
+    let at = |id: &str| page.find(&format!("id=\"plot-{id}\"")).unwrap_or_else(|| panic!("no figure {id}"));
+    assert!(at("circle") < at("radius") && at("radius") < at("bias"));
+    let json = page.split_once("id=\"figures\">").unwrap().1.split_once("</script>").unwrap().0;
+    let figures: Value = serde_json::from_str(json).unwrap();
+    let circle = figures.as_array().unwrap().iter().find(|f| f["id"] == "circle").unwrap();
+    let off = |name: &str| -> f64 {
+        let trace = circle["traces"].as_array().unwrap().iter().find(|t| t["name"] == name).unwrap();
+        let [x, y] = ["x", "y"].map(|k| trace[k].as_array().unwrap());
+        let radii = x.iter().zip(y).map(|(x, y)| x.as_f64().unwrap().hypot(y.as_f64().unwrap()));
+        radii.fold(0.0, |m: f64, r| m.max((r - 1.0).abs()))
+    };
+    assert!(off("raw") > 0.1 && off("discovered") < 2e-3, "{} {}", off("raw"), off("discovered"));
+}
+
+#[test]
+fn what_belongs_to_the_table_is_no_error_of_the_device() {
+    let folder = TempDir::new().unwrap();
+    let mut text = String::from("t_s,table_deg,theta_deg\n");
+    for i in 0..4000 {
+        let table = 0.36 * i as f64;
+        let of_device = 0.1 * (2.0 * table.to_radians()).sin();
+        let of_table = 0.2 * (50.0 * table.to_radians()).sin();
+        let theta = table + of_device + of_table + 0.01 * noise(i, 5);
+        let _ = writeln!(text, "{},{table},{theta}", i as f64 * 0.01);
+    }
+    let page = page(&folder, &written(&folder, "encoder.csv", &text));
+    let headline = page.split_once("<p class=\"headline\">").unwrap().1.split_once("<div").unwrap().0;
+    // 0.1° and 0.2° of amplitude over one turn: 0.156° rms about the best line, of which the device has 0.066°
+    assert!(headline.contains("0.156°") && headline.contains("6.6 times less"), "{headline}");
+    assert!(headline.contains("0.141° rms of it are the table's"), "{headline}");
+}

@@ -168,6 +168,7 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
             let model = model.clone();
             move |run| model.left(run)
         }),
+        readout: model.front().cloned(),
         direction: Box::new(move |run| {
             model.sensor.samples(std::slice::from_ref(run), model.front()).iter().map(|s| s.theta).collect()
         }),
@@ -221,6 +222,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
         discovered: Box::new(move |run| model.left(run)),
+        readout: None,
         direction: Box::new(move |run| {
             sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
         }),

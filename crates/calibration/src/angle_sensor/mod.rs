@@ -2,6 +2,7 @@
 //! encoders, magnetometers, interferometers.
 mod autoregression;
 mod cross_validation;
+pub(crate) mod curve;
 mod deviations;
 mod effects;
 mod ellipse;

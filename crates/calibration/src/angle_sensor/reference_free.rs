@@ -5,6 +5,7 @@
 use std::f64::consts::TAU;
 
 use super::cross_validation::{Candidate, Folds, Tolerance, choose, losses_of_radius};
+use super::curve::{Curve, mean_radius, undone};
 use super::deviations::{jackknife, other_noise, without_block};
 use super::effects::{LibraryReadout, clip, readout_effects, readout_members};
 use super::ellipse;
@@ -33,8 +34,6 @@ const LARGEST_GAP_DEG: f64 = 180.0;
 const LARGEST_GAP_OF_A_CUBIC_DEG: f64 = 60.0;
 /// What the best curve may leave of the radius, rms: engineering choice.
 const LARGEST_LEFT: f64 = 0.25;
-/// Points of a curve in a figure.
-const POINTS: usize = 1500;
 
 /// What two channels told without a reference.
 #[derive(Debug, Clone)]
@@ -48,15 +47,6 @@ pub(crate) struct Told {
     pub(crate) warnings: Vec<String>,
     /// points as recorded and with what was found undone, both over the mean radius
     pub(crate) curve: Curve,
-}
-
-/// Held-out points, as a figure shows them.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Curve {
-    /// x and y as recorded, over their mean radius
-    pub before: Vec<[f64; 2]>,
-    /// x and y with what was found undone, over their mean radius
-    pub after: Vec<[f64; 2]>,
 }
 
 /// A sensor with two channels and no reference in any run, or none that is to be used.
@@ -129,7 +119,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         },
         calibration,
         warnings: unseen(raw_turns, &readout),
-        curve: Curve { before: points(&plain, &held), after: points(&readout, &held) },
+        curve: Curve::new(&readout, &held),
     })
 }
 
@@ -227,17 +217,6 @@ fn deviations(readout: &Readout, runs: &[SensorRun]) -> [f64; 6] {
     std::array::from_fn(|i| jackknife(&fits.iter().map(|f| f[i]).collect::<Vec<_>>()).hypot(other[i] / STUDENT_19))
 }
 
-/// Points of all runs behind the readout; rows at a rail are left out.
-fn undone<'a>(readout: &'a Readout, runs: &'a [SensorRun]) -> impl Iterator<Item = [f64; 2]> + 'a {
-    let rows = runs.iter().filter_map(SensorRun::channels).flatten();
-    rows.filter(|z| !readout.rails.clips(**z)).map(|z| readout.undo(*z))
-}
-
-fn mean_radius(readout: &Readout, runs: &[SensorRun]) -> f64 {
-    let (n, sum) = undone(readout, runs).fold((0.0, 0.0), |(n, sum), [x, y]| (n + 1.0, sum + x.hypot(y)));
-    sum / f64::max(n, 1.0)
-}
-
 fn constancy(readout: &Readout, runs: &[SensorRun]) -> Constancy {
     let mean = mean_radius(readout, runs);
     let (n, square, peak) = undone(readout, runs).fold((0.0, 0.0, 0.0f64), |(n, square, peak), [x, y]| {
@@ -269,12 +248,6 @@ fn correction(readout: &Readout, runs: &[SensorRun]) -> f64 {
     let (sine, cosine) = moved.iter().fold((0.0, 0.0), |(s, c), d| (s + d.sin(), c + d.cos()));
     let middle = f64::atan2(sine, cosine);
     (moved.iter().map(|d| wrapped(d - middle, TAU).powi(2)).sum::<f64>() / n).sqrt()
-}
-
-fn points(readout: &Readout, runs: &[SensorRun]) -> Vec<[f64; 2]> {
-    let mean = mean_radius(readout, runs);
-    let all: Vec<[f64; 2]> = undone(readout, runs).collect();
-    all.iter().step_by((all.len() / POINTS).max(1)).map(|[x, y]| [x / mean, y / mean]).collect()
 }
 
 /// Whether a calibration could be read again.

@@ -1,6 +1,8 @@
 //! The report of a sensor or a rate gyroscope: the held-out error at each stage, what is left, and the facts of what was
 //! found, in the form that all instruments share.
 
+use super::curve::Curve;
+use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
@@ -48,6 +50,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) discovered: Errors<'a>,
     /// the angle that the error is shown against
     pub(crate) direction: Errors<'a>,
+    /// what is undone in the channels, where there are two
+    pub(crate) readout: Option<Readout>,
     /// period of the angle, rad
     pub(crate) period: f64,
 }
@@ -177,8 +181,11 @@ pub(crate) fn report(
         decay: None,
         warnings,
     };
-    let figures =
-        Figures { bias: curves(held, raw.as_ref(), &declared, &after, finding.period), ring_downs: Vec::new() };
+    let figures = Figures {
+        bias: curves(held, raw.as_ref(), &declared, &after, finding.period),
+        ring_downs: Vec::new(),
+        channels: finding.readout.filter(|_| with_plots).map(|readout| Curve::new(&readout, held)),
+    };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
     let provenance = Provenance {
         tool: Some(Tool::default()),

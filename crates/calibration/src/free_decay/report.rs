@@ -131,7 +131,7 @@ pub(crate) fn report(
         decay: Some(decay(finding, fitted, &head)),
         warnings,
     };
-    let figures = Figures { bias: curves(&names, raw_errors, declared, found), ring_downs: Vec::new() };
+    let figures = Figures { bias: curves(&names, raw_errors, declared, found), ..Figures::default() };
     let provenance = Provenance { tool: Some(Tool::default()), inputs: head.inputs, ..Provenance::default() };
     let mut calibration = Calibration { device: head.device, hypothesis, provenance };
     let facts = Facts {

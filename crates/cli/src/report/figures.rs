@@ -6,6 +6,8 @@ use cvg_calibration::{BiasCurve, Identification};
 use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
 
+use super::circle;
+use super::tables::name_of_angle;
 use crate::clouds::thinned;
 
 /// One figure.
@@ -48,13 +50,14 @@ const INKS: [&str; 7] = ["@declared", "@raw", "@discovered", "@4", "@5", "@6", "
 
 /// Every figure that the identification has the data for.
 pub(super) fn all(identified: &Identification) -> Vec<Figure> {
-    let mut out = vec![bias(identified)];
+    let channels = identified.figures.channels.iter().flat_map(circle::figures);
+    let mut out: Vec<Figure> = channels.chain([bias(identified)]).collect();
     let empty = PlotData::default();
     let plots = identified.plots.as_ref().unwrap_or(&empty);
-    out.extend(angle(plots));
+    out.extend(angle(plots, identified));
     out.extend(ring_downs(identified));
     out.extend(drive(plots));
-    out.extend(harmonics(plots));
+    out.extend(harmonics(plots, name_of_angle(identified)));
     out.extend(plots.scaling.iter().filter_map(scaling));
     out.extend(residual(plots));
     out.extend(memory(plots));
@@ -120,9 +123,8 @@ fn bias(identified: &Identification) -> Figure {
             "hovertemplate": "%{x:.2f}°: %{y:.5f}°<br>%{text}",
         }));
     }
-    let pattern = identified.report.instrument == "gyroscope" && !super::tables::is_rate_gyroscope(identified);
-    let over = if !pattern { "angle [deg]" } else { "pattern angle [deg]" };
-    let x = angles_axis(over, identified.calibration.hypothesis.period_rad.to_degrees());
+    let over = format!("{} [deg]", name_of_angle(identified));
+    let x = angles_axis(&over, identified.calibration.hypothesis.period_rad.to_degrees());
     let layout = json!({"xaxis": x, "yaxis": axis("angle error [deg]"), "showlegend": false});
     let caption = "Angle minus the best line on held-out data, before any compensation, after the declared effects, and \
                    after all. Switch off a stage to enlarge the others. Where points of a run leave the curve, its error \
@@ -130,23 +132,22 @@ fn bias(identified: &Identification) -> Figure {
     Figure { toggles, ..Figure::new("bias", "Angle-dependent bias", caption, traces, layout).wide() }
 }
 
-fn angle(plots: &PlotData) -> Option<Figure> {
-    let curve = plots.angles.first()?;
+fn angle(plots: &PlotData, identified: &Identification) -> Option<Figure> {
+    let (curve, name) = (plots.angles.first()?, name_of_angle(identified));
     let t = shorts(curve.t_s.iter().copied());
     let line = |name: &str, y: &[f64], axis: &str, ink: &str| {
         json!({"type": "scatter", "mode": "lines", "name": name, "x": t, "y": shorts(y.iter().copied()),
                "yaxis": axis, "line": {"color": ink, "width": 1.6}, "hovertemplate": "%{x:.4f} s: %{y:.3f}°"})
     };
-    let traces = vec![
-        line("pattern angle", &curve.wrapped_deg, "y", "@declared"),
-        line("unwrapped", &curve.unwrapped_deg, "y2", "@raw"),
-    ];
+    let traces =
+        vec![line(name, &curve.wrapped_deg, "y", "@declared"), line("unwrapped", &curve.unwrapped_deg, "y2", "@raw")];
     let layout = json!({
-        "xaxis": axis("time [s]"), "yaxis": angles_axis("pattern angle [deg]", 180.0),
+        "xaxis": axis("time [s]"), "yaxis": angles_axis(&format!("{name} [deg]"), identified.calibration.hypothesis.period_rad.to_degrees()),
         "yaxis2": {"title": {"text": "unwrapped [deg]"}, "overlaying": "y", "side": "right", "showgrid": false},
     });
-    let caption = format!("As recorded in {}, the first held-out turns of the pattern.", run_name(&curve.name));
-    Some(Figure::new("angle", "Pattern angle", caption, traces, layout))
+    let caption = format!("As recorded in {}, the first held-out turns.", run_name(&curve.name));
+    let title = format!("{}{}", name[..1].to_uppercase(), &name[1..]);
+    Some(Figure::new("angle", &title, caption, traces, layout))
 }
 
 fn ring_downs(identified: &Identification) -> Option<Figure> {
@@ -200,7 +201,7 @@ fn drive(plots: &PlotData) -> Option<Figure> {
     Some(Figure::new("drive", "Energy control over the pattern angle", caption, traces, layout).wide())
 }
 
-fn harmonics(plots: &PlotData) -> Option<Figure> {
+fn harmonics(plots: &PlotData, angle: &str) -> Option<Figure> {
     let any = plots.stages.iter().any(|(_, h)| !h.is_empty());
     let traces = plots.stages.iter().map(|(name, list)| {
         json!({
@@ -212,7 +213,7 @@ fn harmonics(plots: &PlotData) -> Option<Figure> {
         })
     });
     let layout = json!({
-        "barmode": "group", "xaxis": axis("harmonic of the pattern angle"),
+        "barmode": "group", "xaxis": axis(&format!("harmonic of the {angle}")),
         "yaxis": {"title": {"text": "amplitude [deg]"}, "type": "log", "exponentformat": "power", "dtick": 1},
     });
     let caption =

@@ -73,6 +73,24 @@ pub(super) fn times(before: f64, after: f64) -> String {
     }
 }
 
+/// The part of the raw error that belongs to the reference and not to the device, rms, deg: it was taken out, and that makes no
+/// instrument better.
+pub(super) fn of_the_table(r: &Report) -> f64 {
+    let of = |e: &EffectReport| {
+        let amplitude = e.parameters.iter().find(|p| p.name == "amplitude");
+        let line = amplitude.map(|p| (p.value / std::f64::consts::SQRT_2).to_degrees().powi(2));
+        line.or(e.heldout_rms_deg.map(|b| (b.before * b.before - b.after * b.after).max(0.0))).unwrap_or(0.0)
+    };
+    let table = r.effects.iter().filter(|e| e.id == EffectId::TableHarmonic.description().id);
+    table.map(of).sum::<f64>().sqrt()
+}
+
+/// The raw error without what belongs to the table.
+pub(super) fn of_the_device(r: &Report) -> f64 {
+    let raw = r.heldout.raw.unwrap_or(r.heldout.declared).rms_deg;
+    (raw * raw - of_the_table(r).powi(2)).max(0.0).sqrt().max(r.heldout.discovered.rms_deg)
+}
+
 /// What the campaign says of the instrument, in one sentence.
 pub(super) fn finding(r: &Report) -> String {
     let mut sentence = format!("The angle error of {} ", r.device);
@@ -99,6 +117,10 @@ pub(super) fn finding(r: &Report) -> String {
     if empirical > 0 {
         let (is, of) = if empirical == 1 { ("is", "part") } else { ("are", "parts") };
         sentence += &format!("; {empirical} {of} of it {is} corrected without a known cause");
+    }
+    let table = of_the_table(r);
+    if table > 0.0 {
+        sentence += &format!("; {} rms of it are the table's, and no error of the device", degrees(table));
     }
     let rest = r.heldout.discovered.rms_deg;
     if rest <= AT_THE_NOISE * r.heldout.noise_floor_deg {

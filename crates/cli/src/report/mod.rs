@@ -3,6 +3,7 @@
 //! The page is plain HTML that can be read, searched and printed as it is; the figures are data beside it, drawn by
 //! Plotly's basic bundle (`assets/README.md`), which is part of the file.
 
+mod circle;
 mod figures;
 mod finding;
 pub(crate) mod fleet;
@@ -16,7 +17,8 @@ use cvg_calibration::Identification;
 use serde_json::Value;
 
 use self::figures::Figure;
-use self::finding::{finding, times};
+use self::finding::{finding, of_the_device, times};
+pub(crate) use self::tables::name_of_angle;
 use crate::{Failure, clouds, output};
 
 const STYLE: &str = include_str!("page.css");
@@ -113,7 +115,7 @@ fn headline(h: &mut String, identified: &Identification) {
         "<p class=\"headline\">{} <span class=\"arrow\">→</span> {} rms angle error, {}</p><p class=\"finding\">{}</p>",
         finding::degrees(before.rms_deg),
         finding::degrees(held.discovered.rms_deg),
-        times(before.rms_deg, held.discovered.rms_deg),
+        times(of_the_device(&identified.report), held.discovered.rms_deg),
         escape(&finding(&identified.report))
     );
 }

@@ -7,6 +7,7 @@ use cvg_calibration::report::survey::Survey;
 use cvg_calibration::report::{Allan, Estimate};
 use serde_json::json;
 
+use super::circle;
 use super::figures::{self, Figure, axis, shorts};
 use super::finding::{degrees, interval, times};
 use super::tables::{row, runs, table, temperature};
@@ -17,11 +18,13 @@ use crate::report::significant;
 /// The page.
 pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     let r = &surveyed.report;
-    let figures: Vec<Figure> =
-        [circle(surveyed), radius(surveyed), r.allan.as_ref().map(deviation), figures::temperature(&r.runs)]
-            .into_iter()
-            .flatten()
-            .collect();
+    let figures: Vec<Figure> = surveyed
+        .curve
+        .iter()
+        .flat_map(circle::figures)
+        .chain(r.allan.as_ref().map(deviation))
+        .chain(figures::temperature(&r.runs))
+        .collect();
     let mut h = String::with_capacity(2 << 20);
     begin(&mut h, &r.device, r.instrument);
     headline(&mut h, r);
@@ -107,42 +110,6 @@ fn files(h: &mut String, r: &Survey) {
 }
 
 /// x over y, as recorded and after, with the circle that they should draw.
-fn circle(surveyed: &Surveyed) -> Option<Figure> {
-    let curve = surveyed.curve.as_ref()?;
-    let points = |name: &str, symbol: &str, points: &[[f64; 2]]| {
-        json!({"type": "scatter", "mode": "markers", "name": name, "meta": name,
-               "x": shorts(points.iter().map(|p| p[0])), "y": shorts(points.iter().map(|p| p[1])),
-               "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8}})
-    };
-    let turn = || (0..=180).map(|i| f64::from(i) * std::f64::consts::PI / 90.0);
-    let circle = json!({"type": "scatter", "mode": "lines", "name": "circle", "x": shorts(turn().map(f64::cos)),
-                        "y": shorts(turn().map(f64::sin)), "line": {"color": "@4", "width": 1.2}});
-    let traces = vec![points("raw", "circle", &curve.before), points("discovered", "diamond", &curve.after), circle];
-    let mut layout =
-        json!({"xaxis": axis("x over the mean radius"), "yaxis": axis("y over the mean radius"), "showlegend": true});
-    layout["yaxis"]["scaleanchor"] = json!("x");
-    layout["xaxis"]["constrain"] = json!("domain");
-    let caption = "The two channels against each other on held-out rows: as recorded, with what was found undone, and the \
-                   circle that a sensor without errors draws.";
-    Some(Figure::new("circle", "X and Y", caption, traces, layout))
-}
-
-fn radius(surveyed: &Surveyed) -> Option<Figure> {
-    let curve = surveyed.curve.as_ref()?;
-    let points = |name: &str, symbol: &str, points: &[[f64; 2]]| {
-        json!({"type": "scatter", "mode": "markers", "name": name, "meta": name,
-               "x": shorts(points.iter().map(|[x, y]| y.atan2(*x).to_degrees())),
-               "y": shorts(points.iter().map(|[x, y]| 100.0 * (x.hypot(*y) - 1.0))),
-               "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8}})
-    };
-    let traces = vec![points("raw", "circle", &curve.before), points("discovered", "diamond", &curve.after)];
-    let mut layout =
-        json!({"xaxis": axis("angle [deg]"), "yaxis": axis("radius less its mean [%]"), "showlegend": true});
-    layout["xaxis"]["dtick"] = json!(45);
-    let caption = "The radius over the angle: once a turn is an offset, twice a gain or a skew, four times a cubic.";
-    Some(Figure::new("radius", "Radius", caption, traces, layout))
-}
-
 fn deviation(allan: &Allan) -> Figure {
     let half = |i: usize| -> Vec<f64> {
         allan

@@ -25,10 +25,18 @@ pub(super) fn is_rate_gyroscope(identified: &Identification) -> bool {
     identified.report.instrument == "gyroscope" && h.period_rad > WHOLE_TURN_RAD
 }
 
+/// A vibration has an orientation, and a sensor an angle.
+pub(crate) fn name_of_angle(identified: &Identification) -> &'static str {
+    if has_pattern(identified) { "pattern angle" } else { "angle" }
+}
+
+fn has_pattern(identified: &Identification) -> bool {
+    identified.report.instrument == "gyroscope" && !is_rate_gyroscope(identified)
+}
+
 /// What was found: before the figures.
 pub(super) fn found(h: &mut String, identified: &Identification) {
-    let has_pattern = identified.report.instrument == "gyroscope" && !is_rate_gyroscope(identified);
-    let declared = if has_pattern { "those of the paper's model" } else { "unequal gains of two channels" };
+    let declared = if has_pattern(identified) { "those of the paper's model" } else { "unequal gains of two channels" };
     effects(h, &identified.report, declared);
     parameters(h, identified);
 }
@@ -175,6 +183,9 @@ fn effects(h: &mut String, r: &Report, declared: &str) {
 }
 
 fn steps(h: &mut String, identified: &Identification) {
+    if !has_pattern(identified) {
+        return;
+    }
     if identified.steps.is_empty() {
         h.push_str("<p>No effect was added to the declared model.</p>");
         return;
