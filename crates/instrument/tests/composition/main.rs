@@ -53,7 +53,8 @@ fn settings(which: usize) -> Settings<'static> {
         actuation: &[],
     };
     match which {
-        0 => Settings { sweep_s: 0.05, ..Settings::default() },
+        // drives are compensated without the readout, with it, and not
+        0 => Settings { sweep_s: 0.05, actuation: DRIVES, ..Settings::default() },
         1 => Settings { readout: UNEVEN, actuation: DRIVES, ..other },
         2 => Settings { readout: LATE, ..other },
         _ => Settings { readout: CLIPPED, window: 24, hold_rad: -0.2, ..Settings::default() },
@@ -130,6 +131,15 @@ fn a_start_from_a_vibration_that_is_heard() {
 #[test]
 fn a_start_from_silence_sweeps_and_ends_in_a_fault() {
     in_both_precisions(&[Event::Silent(2400)], &[Mode::Sweep, Mode::Listen, Mode::Fault]);
+}
+
+#[test]
+fn a_vibration_beside_the_band_is_followed_as_far_as_the_band_goes() {
+    for detuned_hz in [430.0, -430.0, 700.0, -700.0] {
+        let script = [Event::Detuned(detuned_hz), Event::Well(300)];
+        all_settings::<f32>(&script);
+        all_settings::<f64>(&script);
+    }
 }
 
 #[test]

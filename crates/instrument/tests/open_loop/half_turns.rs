@@ -47,6 +47,11 @@ fn too_long_without_a_window_is_doubted<T: Float>() {
         assert_eq!(bench.status.half_turns_lost, doubted, "{windows} windows");
         assert_eq!(bench.status.mode, Mode::WholeAngle);
     }
+    // as many as can be counted, and one more
+    let mut bench = Bench::<T>::running(0.2, 1.0);
+    bench.state.continuity.unseen = u32::MAX;
+    bench.windows_through(1, |_| [f64::NAN; 2]);
+    assert!(bench.status.half_turns_lost);
 }
 
 fn a_jump_and_a_fault_are_doubted<T: Float>() {

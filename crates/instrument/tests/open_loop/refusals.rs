@@ -27,6 +27,46 @@ fn an_effect_of_a_recordings_clock_or_thermometer_is_refused_and_every_other_of_
     assert_eq!(refused, [EffectId::GainDrift, EffectId::Temperature, EffectId::TimePeriodic]);
 }
 
+/// A setting, and what is changed there.
+type Change = fn(&mut Settings<'static>, f64);
+
+#[test]
+fn settings_are_taken_up_to_their_edges_and_refused_beyond_by_name() {
+    let new = |change: Change, value: f64| {
+        let mut s = Settings::default();
+        change(&mut s, value);
+        (Instrument::<f32>::new(&s).err().map(|e| e.parameter), Instrument::<f64>::new(&s).err().map(|e| e.parameter))
+    };
+    // a value that is taken, and the next one that is not
+    let ten_samples = 10.0 / Settings::default().sample_hz;
+    let edges: [(&str, Change, f64, f64); 6] = [
+        ("amplitude_v", |s, v| s.amplitude_v = v, 0.9 * 2.5, (0.9_f64 * 2.5).next_up()),
+        ("readout_delay_s", |s, v| s.readout_delay_s = v, ten_samples, ten_samples.next_up()),
+        ("drive_delay_s", |s, v| s.drive_delay_s = v, ten_samples, ten_samples.next_up()),
+        ("readout_delay_s", |s, v| s.readout_delay_s = v, 0.0, -1e-12),
+        ("drive_delay_s", |s, v| s.drive_delay_s = v, 0.0, -1e-12),
+        // 1.1 times the band turns by less than half a turn in a window, 400 Hz at 0.5 ms
+        ("window", |s, v| s.window = v as u16, 124.0, 125.0),
+    ];
+    for (name, change, taken, refused) in edges {
+        assert_eq!(new(change, taken), (None, None), "{name} = {taken}");
+        assert_eq!(new(change, refused), (Some(name), Some(name)), "{name} = {refused}");
+    }
+    let positive: [(&str, Change); 6] = [
+        ("carrier_hz", |s, v| s.carrier_hz = v),
+        ("sample_hz", |s, v| s.sample_hz = v),
+        ("adc_full_scale_v", |s, v| s.adc_full_scale_v = v),
+        ("dac_limit_v", |s, v| s.dac_limit_v = v),
+        ("amplitude_v", |s, v| s.amplitude_v = v),
+        ("drive_per_s_v", |s, v| s.drive_per_s_v = v),
+    ];
+    for (name, change) in positive {
+        for bad in [f64::NAN, f64::INFINITY, -f64::INFINITY, 0.0, -1.0, 1e-9, 1e9] {
+            assert_eq!(new(change, bad), (Some(name), Some(name)), "{name} = {bad}");
+        }
+    }
+}
+
 /// A readout that saturates at 0.9 V: none of 1 V has a vibration behind it.
 const SATURATION: &[(EffectId, Values<f64>)] = &[(EffectId::DetectionSaturation, [0.9, 0.0, 0.0, 0.0])];
 

@@ -8,6 +8,7 @@ const FORCES: (&str, &str) = ("cvg-controller", "forces");
 const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
 const OPEN_LOOP: (&str, &str) = ("cvg-instrument", "open_loop");
 const INSTRUMENT: (&str, &str) = ("cvg-instrument", "--lib");
+const JOINED: (&str, &str) = ("cvg-instrument", "composition");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -79,5 +80,54 @@ pub(super) const FAULTS: &[Fault] = &[
         "(sum_y == y && now_y == last_y && *now_y != zero)",
         "(sum_y == y && *now_y != zero)",
         INSTRUMENT,
+    ),
+    fault(
+        "nine tenths exactly are refused",
+        "instrument/src/settings.rs",
+        "if s.amplitude_v > 0.9 *",
+        "if s.amplitude_v >= 0.9 *",
+        OPEN_LOOP,
+    ),
+    fault(
+        "ten samples of delay exactly are refused",
+        "instrument/src/settings.rs",
+        "value <= 10.0 * period_s",
+        "value < 10.0 * period_s",
+        OPEN_LOOP,
+    ),
+    fault(
+        "a setting of no number is taken",
+        "instrument/src/settings.rs",
+        "if !(value > 1e-9 && value < 1e9) {",
+        "if value <= 1e-9 || value >= 1e9 {",
+        OPEN_LOOP,
+    ),
+    fault(
+        "the drives' effects are undone only where the readout's are",
+        "instrument/src/settings.rs",
+        "let actuation = if actuation.is_empty() { None }",
+        "let actuation = if actuation.is_empty() || readout.is_none() { None }",
+        JOINED,
+    ),
+    fault(
+        "what was heard sets any frequency",
+        "instrument/src/step.rs",
+        "correction_rad_s = (correction_rad_s + off).bounded(self.oscillator.limit_rad_s());",
+        "correction_rad_s = correction_rad_s + off;",
+        JOINED,
+    ),
+    fault(
+        "the unseen wrap",
+        "instrument/src/continuity.rs",
+        "self.unseen.saturating_add(1)",
+        "self.unseen.wrapping_add(1)",
+        OPEN_LOOP,
+    ),
+    fault(
+        "half a turn of the band exactly is taken",
+        "instrument/src/settings.rs",
+        "if limit_rad_s * window_s >= PI {",
+        "if limit_rad_s * window_s > 2.0 * PI {",
+        OPEN_LOOP,
     ),
 ];
