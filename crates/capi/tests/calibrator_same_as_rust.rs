@@ -75,6 +75,13 @@ fn control(n: u32) -> Control {
 }
 
 #[test]
+fn the_calibrator_is_that_of_every_setting() {
+    let (c, _, rust, _) = both();
+    // SAFETY: what the library has written there
+    assert_eq!(unsafe { *(&raw const c).cast::<Calibrator<f32>>() }, rust);
+}
+
+#[test]
 fn c_learns_what_rust_learns() {
     let (c, mut l, rust, _) = both();
     // something is known of everything
@@ -124,10 +131,17 @@ fn c_learns_what_rust_learns() {
     }
     // SAFETY: the same
     let known = unsafe { cvg_calibrator_known(&raw const c, &raw const l) };
-    let status = rust.status(&state);
+    assert_eq!(known, asked(&rust, &state));
+    assert!(known.ratio_sigma > 0.0 && known.skew_sigma > 0.0 && known.ratio_sigma != known.skew_sigma);
+    assert_eq!(saved(&c, &l), rust.save(&state));
+}
+
+/// What is known, as Rust has it.
+fn asked(rust: &Calibrator<f32>, state: &State<f32>) -> Known {
+    let status = rust.status(state);
     let of = |p| state.estimate(p).map_or((0.0, 0.0), |e| (e.value, e.sigma));
     let ((ratio, ratio_sigma), (skew, skew_sigma)) = (of(Parameter::DetectionRatio), of(Parameter::DetectionSkew));
-    let asked = Known {
+    Known {
         learned: status.learned,
         detection_known: status.detection_known,
         detection_followed: status.detection_followed,
@@ -137,10 +151,57 @@ fn c_learns_what_rust_learns() {
         ratio_sigma,
         skew,
         skew_sigma,
-    };
-    assert_eq!(known, asked);
-    assert!(known.ratio_sigma > 0.0 && known.skew_sigma > 0.0 && known.ratio_sigma != known.skew_sigma);
-    assert_eq!(saved(&c, &l), rust.save(&state));
+    }
+}
+
+/// A record whose detection is known to this standard deviation, in expected units, of this version, and its checksum.
+fn record_of(record: &[u8; CVG_RECORD_BYTES], sigma: f64, version: u8) -> [u8; CVG_RECORD_BYTES] {
+    let mut changed = *record;
+    changed[4] = version;
+    // before the checksum stand three variances and three factors
+    let factors = CVG_RECORD_BYTES - 4 - 6 * 8;
+    for k in 0..3 {
+        changed[factors + 8 * k..factors + 8 * k + 8].copy_from_slice(&(sigma * sigma).to_le_bytes());
+    }
+    let (body, tail) = changed.split_at_mut(CVG_RECORD_BYTES - 4);
+    let step = |crc: u32, _| if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 };
+    let crc = !body.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step));
+    tail.copy_from_slice(&crc.to_le_bytes());
+    changed
+}
+
+#[test]
+fn what_is_known_is_told_flag_by_flag() {
+    let (c, mut l, rust, state) = both();
+    // SAFETY: filled by the library
+    let known = |l: &LearnedMemory| unsafe { cvg_calibrator_known(&raw const c, l) };
+    assert_eq!(known(&l), asked(&rust, &state));
+    assert!(!known(&l).detection_known);
+    // a detection that was known when it was saved: known, and not followed by anything that turns
+    let record = record_of(&saved(&c, &l), 0.01, saved(&c, &l)[4]);
+    // SAFETY: filled by the library, and as many bytes as it reads
+    assert_eq!(
+        unsafe { cvg_calibrator_restore(&raw const c, &raw mut l, record.as_ptr()) },
+        cvg_record::CVG_RECORD_RESTORED
+    );
+    let mut state = rust.restore(&record).expect("what was saved");
+    assert_eq!(known(&l), asked(&rust, &state));
+    assert!(known(&l).detection_known && !known(&l).detection_followed);
+    // commands that grow and shrink by three, of no instrument: what was committed of them is taken back
+    let taken_back = (0..200_000).find(|n| {
+        let mut k = control(*n);
+        let grown = if n / 1000 % 2 == 1 && *n > 60_000 { 3.0 } else { 1.0 };
+        (k.v_qc, k.v_qs, k.quadrature) = (grown * k.v_qc, grown * k.v_qs, grown * k.quadrature);
+        k.disturbed = false;
+        let p = Pendulum { e: k.energy, q: k.quadrature, r: k.r, s: k.s, l: k.l };
+        let commands = Commands { energy_v: k.v_as, precession_v: k.v_qs, quadrature_v: k.v_qc };
+        rust.step(&mut state, &p, (k.cos, k.sin), &commands, Health::Operating);
+        rust.status(&state).taken_back > 0
+    });
+    assert!(taken_back.is_some(), "{:?}", rust.status(&state));
+    *learned(&mut l) = state;
+    assert_eq!(known(&l), asked(&rust, &state));
+    assert!(known(&l).taken_back > 0 && known(&l).learned);
 }
 
 fn saved(c: &CalibratorMemory, l: &LearnedMemory) -> [u8; CVG_RECORD_BYTES] {
@@ -152,15 +213,29 @@ fn saved(c: &CalibratorMemory, l: &LearnedMemory) -> [u8; CVG_RECORD_BYTES] {
 
 #[test]
 fn records_are_restored_or_refused_by_their_fault() {
-    let (c, mut l, ..) = both();
+    let (c, mut l, rust, _) = both();
     let record = saved(&c, &l);
-    // SAFETY: filled by the library, and as many bytes as it reads
-    let mut restore =
-        |record: &[u8; CVG_RECORD_BYTES]| unsafe { cvg_calibrator_restore(&raw const c, &raw mut l, record.as_ptr()) };
-    assert_eq!(restore(&record), cvg_record::CVG_RECORD_RESTORED);
+    let known = record_of(&record, 0.01, record[4]);
+    *learned(&mut l) = rust.restore(&known).expect("what was saved");
     let mut damaged = record;
     damaged[CVG_RECORD_BYTES / 2] ^= 1;
-    assert_eq!(restore(&damaged), cvg_record::CVG_RECORD_DAMAGED);
+    let refusals = [
+        (damaged, cvg_record::CVG_RECORD_DAMAGED),
+        (record_of(&record, 0.01, record[4] + 1), cvg_record::CVG_RECORD_OF_ANOTHER_VERSION),
+        (record_of(&record, f64::NAN, record[4]), cvg_record::CVG_RECORD_IMPLAUSIBLE),
+    ];
+    let before = *learned(&mut l);
+    for (refused, why) in refusals {
+        // SAFETY: filled by the library, and as many bytes as it reads
+        assert_eq!(unsafe { cvg_calibrator_restore(&raw const c, &raw mut l, refused.as_ptr()) }, why);
+        assert!(*learned(&mut l) == before, "{why:?} has changed what was learned");
+    }
+    // SAFETY: the same
+    assert_eq!(
+        unsafe { cvg_calibrator_restore(&raw const c, &raw mut l, record.as_ptr()) },
+        cvg_record::CVG_RECORD_RESTORED
+    );
+    assert!(*learned(&mut l) == rust.restore(&record).expect("what was saved"));
     // SAFETY: null is admitted
     assert_eq!(
         unsafe { cvg_calibrator_restore(&raw const c, null_mut(), record.as_ptr()) },

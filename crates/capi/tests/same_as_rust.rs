@@ -43,6 +43,11 @@ impl Of {
         unsafe { cvg_step(&raw const self.instrument, &raw mut self.state, x, y) }
     }
 
+    fn instrument(&self) -> &Instrument<f32> {
+        // SAFETY: what `cvg_init` has written there
+        unsafe { &*(&raw const self.instrument).cast::<Instrument<f32>>() }
+    }
+
     fn state(&mut self) -> &mut State<f32> {
         // SAFETY: what `cvg_init` has written there
         unsafe { &mut *(&raw mut self.state).cast::<State<f32>>() }
@@ -183,6 +188,77 @@ fn c_is_given_what_rust_is_given_through_a_start_and_faults() {
 }
 
 #[test]
+fn the_instrument_is_that_of_every_setting_and_of_as_many_effects_as_there_is_room_for() {
+    let (of, instrument, _) = both();
+    assert_eq!(*of.instrument(), instrument);
+    // four of each, with as many values as an effect has, in their order
+    let readout = [
+        (EffectId::DetectionGainMismatch, [1.0132, 0.0, 0.0, 0.0]),
+        (EffectId::DetectionOffset, [0.01, -0.02, 0.0, 0.0]),
+        (EffectId::DriveFeedthrough, [0.001, -0.002, 0.003, -0.004]),
+        (EffectId::HarmonicN, [4.0, 2e-3, -1e-3, 2.0]),
+    ];
+    let actuation = [
+        (EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]),
+        (EffectId::ActuationSkew, [0.02, 0.0, 0.0, 0.0]),
+        (EffectId::ActuationGainMismatch, [0.98, 0.0, 0.0, 0.0]),
+        (EffectId::ActuationSkew, [-0.01, 0.0, 0.0, 0.0]),
+    ];
+    let named = |effects: [(EffectId, [f64; 4]); 4]| {
+        effects.map(|(id, values)| (CString::new(id.description().id).expect("no zero"), values))
+    };
+    let (read, actuated) = (named(readout), named(actuation));
+    let of_names = |named: &[(CString, [f64; 4]); 4]| {
+        [0, 1, 2, 3].map(|n: usize| Effect { id: named[n].0.as_ptr(), values: named[n].1 })
+    };
+    let (c_readout, c_actuation) = (of_names(&read), of_names(&actuated));
+    let base = Rust::default();
+    let settings = Settings {
+        readout: c_readout.as_ptr(),
+        readout_count: 4,
+        actuation: c_actuation.as_ptr(),
+        actuation_count: 4,
+        ..in_c(&base)
+    };
+    let of = Of::settings(&settings).expect("inside its domain");
+    let rust = cvg_instrument::Settings { readout: &readout, actuation: &actuation, ..base };
+    assert_eq!(*of.instrument(), Instrument::new(&rust).expect("inside its domain"));
+}
+
+#[test]
+fn what_was_seen_is_told_field_by_field() {
+    let mut of = both().0;
+    let seen = cvg_instrument::Seen {
+        readout: cvg_model::Envelope::new(0.1, 0.2, 0.3, 0.4),
+        compensated: cvg_model::Envelope::new(0.5, 0.7, 1.1, 1.3),
+        v_as: 2.0,
+        v_qc: 3.0,
+        v_qs: 4.0,
+        correction_rad_s: 5.0,
+    };
+    of.state().seen = seen;
+    of.state().precession.half_turns = 3;
+    // SAFETY: filled by `cvg_init`
+    let (told, angle_deg) = unsafe { (cvg_last_control(&raw const of.state), cvg_angle_deg(&raw const of.state)) };
+    let p = seen.compensated.pendulum();
+    let asked = cvg::Seen {
+        x_c: 0.1,
+        x_s: 0.2,
+        y_c: 0.3,
+        y_s: 0.4,
+        energy: p.e,
+        quadrature: p.q,
+        v_as: 2.0,
+        v_qc: 3.0,
+        v_qs: 4.0,
+        correction_rad_s: 5.0,
+    };
+    assert_eq!(told, asked);
+    assert_eq!(angle_deg, of.state().angle_deg());
+    assert!(angle_deg > 360.0, "with its half turns: {angle_deg}");
+}
+
+#[test]
 fn every_mode_and_every_fault_has_its_name() {
     let modes = [
         Mode::Listen,
@@ -250,7 +326,7 @@ fn defaults_are_those_of_rust() {
 fn nothing_is_answered_with_nothing() {
     let settings = in_c(&Rust::default());
     let mut of = Of::settings(&settings).expect("inside its domain");
-    let before = *of.state();
+    let (before, instrument) = (*of.state(), *of.instrument());
     // SAFETY: null is admitted everywhere
     unsafe {
         for out in [
@@ -259,6 +335,8 @@ fn nothing_is_answered_with_nothing() {
             cvg_step(null(), null_mut(), 0.5, 0.5),
         ] {
             assert_eq!((out.dac_x, out.dac_y, out.valid, out.fresh), (0.0, 0.0, false, false));
+            // of an instrument that is not there nobody knows the half turns
+            assert_eq!((out.clipped, out.half_turns_lost), (false, true));
             assert!(alike(&out.mode, &Mode::Fault) && alike(&out.fault, &Fault::InvalidSamples));
         }
         assert!(!cvg_wish(null_mut(), 0));
@@ -270,6 +348,10 @@ fn nothing_is_answered_with_nothing() {
         assert!(cvg_init(&raw mut of.instrument, null_mut(), &raw const settings).parameter_length > 0);
     }
     assert_eq!(*of.state(), before, "what was refused has changed the state");
+    let refused = Settings { window: 0, ..settings };
+    // SAFETY: they are such structures
+    assert!(unsafe { cvg_init(&raw mut of.instrument, &raw mut of.state, &raw const refused) }.parameter_length > 0);
+    assert_eq!((*of.state(), *of.instrument()), (before, instrument), "what was refused has changed something");
 }
 
 #[test]

@@ -147,12 +147,19 @@ fn a_harmonic_scales_with_the_rate_as_it_is_told() {
 
 #[test]
 fn the_input_rate_is_what_reaches_the_resonator() {
-    let rate = |id: EffectId, values| id.input_rate(&values, 3.0, &now());
-    let ripple = 0.1 * 1.4_f64.cos() - 0.2 * 1.4_f64.sin();
-    assert_abs_diff_eq!(rate(EffectId::TableHarmonic, [2.0, 0.1, 0.2, 0.0]), 3.0 * (1.0 + ripple), epsilon = 1e-15);
-    assert_abs_diff_eq!(rate(EffectId::RateOffset, [0.05, 0.0, 0.0, 0.0]), 3.05, epsilon = 1e-15);
-    assert_abs_diff_eq!(rate(EffectId::ScaleDrift, [0.02, 0.0, 0.0, 0.0]), 3.15, epsilon = 1e-15);
-    assert_eq!(rate(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0]), 3.0, "a readout leaves it");
+    // in both senses: a ripple and a scale go with the rate, a drift does not
+    for table in [3.0, -3.0, 0.0] {
+        let rate = |id: EffectId, values| id.input_rate(&values, table, &now());
+        let ripple = 0.1 * 1.4_f64.cos() - 0.2 * 1.4_f64.sin();
+        assert_abs_diff_eq!(
+            rate(EffectId::TableHarmonic, [2.0, 0.1, 0.2, 0.0]),
+            table * (1.0 + ripple),
+            epsilon = 1e-15
+        );
+        assert_abs_diff_eq!(rate(EffectId::RateOffset, [0.05, 0.0, 0.0, 0.0]), table + 0.05, epsilon = 1e-15);
+        assert_abs_diff_eq!(rate(EffectId::ScaleDrift, [0.02, 0.0, 0.0, 0.0]), 1.05 * table, epsilon = 1e-15);
+        assert_eq!(rate(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0]), table, "a readout leaves it");
+    }
 }
 
 #[test]

@@ -9,6 +9,9 @@ const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
 const OPEN_LOOP: (&str, &str) = ("cvg-instrument", "open_loop");
 const INSTRUMENT: (&str, &str) = ("cvg-instrument", "--lib");
 const JOINED: (&str, &str) = ("cvg-instrument", "composition");
+const EFFECTS: (&str, &str) = ("cvg-model", "effects");
+const C: (&str, &str) = ("cvg-capi", "same_as_rust");
+const LEARNING: (&str, &str) = ("cvg-capi", "calibrator_same_as_rust");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -129,5 +132,75 @@ pub(super) const FAULTS: &[Fault] = &[
         "if limit_rad_s * window_s >= PI {",
         "if limit_rad_s * window_s > 2.0 * PI {",
         OPEN_LOOP,
+    ),
+    fault(
+        "a steady drift has the sense of the table",
+        "model/src/effects/rate_offset.rs",
+        "rate_rad_s + offset",
+        "if rate_rad_s < T::zero() { rate_rad_s - offset } else { rate_rad_s + offset }",
+        EFFECTS,
+    ),
+    fault(
+        "the hold is at zero in C",
+        "capi/src/lib.rs",
+        "        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        hold_rad: 0.0,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        C,
+    ),
+    fault(
+        "the rate loop has the phase loop's tuning in C",
+        "capi/src/lib.rs",
+        "        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        rate: tuning(s.phase),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        C,
+    ),
+    fault(
+        "four effects are one too many in C",
+        "capi/src/lib.rs",
+        "if count > MOST_COMPENSATED {",
+        "if count >= MOST_COMPENSATED {",
+        C,
+    ),
+    fault(
+        "nothing is lost without an instrument in C",
+        "capi/src/lib.rs",
+        "    valid: false,\n    half_turns_lost: true,",
+        "    valid: false,\n    half_turns_lost: false,",
+        C,
+    ),
+    fault(
+        "what is followed is known in C",
+        "capi/src/calibrator.rs",
+        "detection_known: status.detection_known,",
+        "detection_known: status.detection_followed,",
+        LEARNING,
+    ),
+    fault(
+        "what is known is followed in C",
+        "capi/src/calibrator.rs",
+        "detection_followed: status.detection_followed,",
+        "detection_followed: status.detection_known,",
+        LEARNING,
+    ),
+    fault(
+        "the dither is the precession in C",
+        "capi/src/calibrator.rs",
+        "        precession_rad_s: s.precession_rad_s,\n        dither_rad_s: s.dither_rad_s,\n    });",
+        "        precession_rad_s: s.dither_rad_s,\n        dither_rad_s: s.precession_rad_s,\n    });",
+        LEARNING,
+    ),
+    fault(
+        "taken back is never told in C",
+        "capi/src/calibrator.rs",
+        "taken_back: status.taken_back,",
+        "taken_back: 0,",
+        LEARNING,
+    ),
+    fault(
+        "a record that is refused empties what was learned in C",
+        "capi/src/calibrator.rs",
+        "Err(Refused::Damaged) =>",
+        "Err(Refused::Damaged) if { *s = c.start(); false } => cvg_record::CVG_RECORD_DAMAGED,\n        Err(Refused::Damaged) =>",
+        LEARNING,
     ),
 ];
