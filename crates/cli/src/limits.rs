@@ -18,10 +18,10 @@ const WANTED: &str =
 
 /// Limits of a report.
 #[derive(Debug, Default)]
-pub(crate) struct Limits(Vec<Limit>);
+pub struct Limits(Vec<Limit>);
 
 /// One number, and what it has to be between.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Limit {
     path: String,
     min: Option<f64>,
@@ -38,8 +38,15 @@ enum Found {
 impl Limits {
     /// Reads a limits file.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
-        let bad = |what: String| Failure::input(format!("{}: {what}; wanted {WANTED}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
+        let name = path.display();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}; wanted {WANTED}")))?;
+        Self::of_text(&text, &name.to_string())
+    }
+
+    /// The limits that a text says; `name` is what it is called where something is wrong with it.
+    pub(crate) fn of_text(text: &str, name: &str) -> Result<Self, Failure> {
+        let bad = |what: String| Failure::input(format!("{name}: {what}; wanted {WANTED}"));
         let table: Table = text
             .parse()
             .map_err(|e: toml::de::Error| bad(e.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
@@ -84,23 +91,31 @@ impl Limits {
     /// # Errors
     /// Bad use where a limit names no number of the report.
     pub(crate) fn judge(&self, device: &str, report: &Value) -> Result<Option<String>, Failure> {
-        let mut failed = Vec::new();
-        for limit in &self.0 {
-            let (passes, value) = match find(report, &limit.path.replace('[', ".").replace(']', "")) {
-                Found::Number(value) => (limit.holds(value), value.to_string()),
-                Found::Null => (false, "not told".to_owned()),
+        let verdicts = self.verdicts(report)?;
+        for verdict in &verdicts {
+            output::tell(format_args!("{}", verdict.line(device)));
+        }
+        Ok(outside(device, &verdicts))
+    }
+
+    /// Holds a report against each limit.
+    ///
+    /// # Errors
+    /// Bad use where a limit names no number of the report.
+    pub(crate) fn verdicts(&self, report: &Value) -> Result<Vec<Verdict>, Failure> {
+        let held = |limit: &Limit| {
+            let Limit { path, min, max } = limit.clone();
+            let value = match find(report, &path.replace('[', ".").replace(']', "")) {
+                Found::Number(value) => Some(value),
+                Found::Null => None,
                 Found::Nothing => {
-                    let what = format!("--limits: `{}` names no number of the report; wanted {WANTED}", limit.path);
+                    let what = format!("--limits: `{path}` names no number of the report; wanted {WANTED}");
                     return Err(Failure::input(what));
                 }
             };
-            let word = if passes { "pass" } else { "FAIL" };
-            output::tell(format_args!("{word}  {device}  {} = {value}  ({})", limit.path, limit.in_words()));
-            if !passes {
-                failed.push(limit.path.as_str());
-            }
-        }
-        Ok((!failed.is_empty()).then(|| format!("{device}: outside its limits: {}", failed.join(", "))))
+            Ok(Verdict { passes: value.is_some_and(|value| limit.holds(value)), path, value, min, max })
+        };
+        self.0.iter().map(held).collect()
     }
 }
 
@@ -108,11 +123,39 @@ impl Limit {
     fn holds(&self, value: f64) -> bool {
         self.min.is_none_or(|min| value >= min) && self.max.is_none_or(|max| value <= max)
     }
+}
 
-    fn in_words(&self) -> String {
+/// A number of a report, held against its limit.
+#[derive(Debug, Clone)]
+pub struct Verdict {
+    /// its place in report.json, as the limit names it
+    pub path: String,
+    /// none where the report does not tell it, which does not pass
+    pub value: Option<f64>,
+    /// the least that passes
+    pub min: Option<f64>,
+    /// the most that passes
+    pub max: Option<f64>,
+    /// whether it is within
+    pub passes: bool,
+}
+
+impl Verdict {
+    /// The line that `cvg identify --limits` says.
+    #[must_use]
+    pub fn line(&self, device: &str) -> String {
+        let word = if self.passes { "pass" } else { "FAIL" };
+        let value = self.value.map_or("not told".to_owned(), |value| value.to_string());
         let end = |word: &str, v: Option<f64>| v.map(|v| format!("{word} {v}"));
-        [end("min", self.min), end("max", self.max)].into_iter().flatten().collect::<Vec<_>>().join(", ")
+        let ends = [end("min", self.min), end("max", self.max)].into_iter().flatten().collect::<Vec<_>>().join(", ");
+        format!("{word}  {device}  {} = {value}  ({ends})", self.path)
     }
+}
+
+/// Why a device fails, where it does.
+pub(crate) fn outside(device: &str, verdicts: &[Verdict]) -> Option<String> {
+    let failed: Vec<&str> = verdicts.iter().filter(|v| !v.passes).map(|v| v.path.as_str()).collect();
+    (!failed.is_empty()).then(|| format!("{device}: outside its limits: {}", failed.join(", ")))
 }
 
 /// What stands at a place. Keys may hold dots themselves, as files do: the shortest key that leads on is taken.

@@ -16,6 +16,7 @@ use serde_json::Value;
 use crate::commands::{self, Told};
 pub use crate::compare::Parameter;
 use crate::input::{self, Wanted};
+pub use crate::limits::{Limits, Verdict};
 use crate::{Failure, compare, fleet, inspect, library, report};
 
 /// Columns of a recording by their names.
@@ -120,6 +121,22 @@ pub fn written_effects(files: &[PathBuf]) -> Result<Vec<EffectId>, Failure> {
     Ok(commands::written(files)?.effects)
 }
 
+/// Limits of a report, from their file.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn limits_of_file(file: &Path) -> Result<Limits, Failure> {
+    Limits::read(file)
+}
+
+/// Limits of a report, from the text of such a file.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn limits_of_text(text: &str) -> Result<Limits, Failure> {
+    Limits::of_text(text, "limits")
+}
+
 /// A campaign, answered.
 #[derive(Debug, Clone)]
 pub struct Answered {
@@ -214,6 +231,23 @@ impl Answered {
             Answer::Surveyed(surveyed) => serde_json::to_value(&surveyed.report),
         };
         Ok(compare::of_report(&report.map_err(Failure::input)?))
+    }
+
+    /// The report held against limits, as `cvg identify --limits` does.
+    ///
+    /// # Errors
+    /// Where a limit names no number of the report.
+    pub fn judged(&self, limits: &Limits) -> Result<Vec<Verdict>, Failure> {
+        limits.verdicts(&serde_json::from_str(&self.json).map_err(Failure::input)?)
+    }
+
+    /// The instrument.
+    #[must_use]
+    pub fn device(&self) -> &str {
+        match &self.answer {
+            Answer::Identified(identified) => &identified.report.device,
+            Answer::Surveyed(surveyed) => &surveyed.report.device,
+        }
     }
 
     /// What the report calls the recording that a curve calls by its path.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use cvg_calibration::recording::{Campaign, Cells, Recording, Values};
 use cvg_calibration::{Answer, Identification};
 use cvg_cli::Failure;
-use cvg_cli::service::{self, Answered, Columns, Settings, Unanswered};
+use cvg_cli::service::{self, Answered, Columns, Limits, Settings, Unanswered};
 use pyo3::prelude::*;
 
 use crate::arrow::Table;
@@ -19,12 +19,16 @@ use crate::work::aside;
 /// A parameter: name, unit, value, ends of its 95 % interval.
 type Parameter = (String, String, f64, Option<f64>, Option<f64>);
 
+/// A limit: place, value where it is told, least, most, whether it passes, and the command's line.
+type Verdict = (String, Option<f64>, Option<f64>, Option<f64>, bool, String);
+
 /// An answer.
 #[pyclass(frozen, module = "cvg._cvg")]
 #[derive(Debug)]
 pub(crate) struct Report {
     answered: Arc<Answered>,
     parameters: Vec<Parameter>,
+    verdicts: Vec<Verdict>,
 }
 
 impl Report {
@@ -53,6 +57,10 @@ impl Report {
 
     fn parameters(&self) -> Vec<Parameter> {
         self.parameters.clone()
+    }
+
+    fn verdicts(&self) -> Vec<Verdict> {
+        self.verdicts.clone()
     }
 
     fn calibration(&self) -> Option<Calibration> {
@@ -92,23 +100,48 @@ impl Report {
     }
 }
 
+/// What is asked for beside the recordings.
+struct Asked {
+    effects: Vec<PathBuf>,
+    limits_file: Option<PathBuf>,
+    limits_text: Option<String>,
+}
+
+impl Asked {
+    fn limits(&self) -> Result<Option<Limits>, Failure> {
+        match (&self.limits_file, &self.limits_text) {
+            (Some(file), _) => service::limits_of_file(file).map(Some),
+            (None, Some(text)) => service::limits_of_text(text).map(Some),
+            (None, None) => Ok(None),
+        }
+    }
+}
+
 /// Answers what `open` opens, beside the interpreter.
 fn answered(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
-    effects: Vec<PathBuf>,
+    asked: Asked,
     open: impl FnOnce() -> Result<Campaign, Failure> + Send + 'static,
 ) -> PyResult<Report> {
     let done = aside(py, progress, move |say| -> Result<_, Unanswered> {
         say("reading");
-        let effects = service::written_effects(&effects)?;
+        let limits = asked.limits()?;
+        let effects = service::written_effects(&asked.effects)?;
         let answered = service::answer(open()?, effects, say)?;
         let parameters = answered.parameters()?;
-        Ok((answered, parameters))
+        let verdicts = limits.map_or(Ok(Vec::new()), |limits| answered.judged(&limits))?;
+        Ok((answered, parameters, verdicts))
     })?;
-    let (answered, parameters) = done.map_err(|why| unanswered(py, why))?;
+    let (answered, parameters, verdicts) = done.map_err(|why| unanswered(py, why))?;
     let flat = |p: service::Parameter| (p.name, p.unit, p.value, p.ci95.map(|e| e[0]), p.ci95.map(|e| e[1]));
-    Ok(Report { answered: Arc::new(answered), parameters: parameters.into_iter().map(flat).collect() })
+    let parameters = parameters.into_iter().map(flat).collect();
+    let told = |v: service::Verdict| {
+        let line = v.line(answered.device());
+        (v.path, v.value, v.min, v.max, v.passes, line)
+    };
+    let verdicts = verdicts.into_iter().map(told).collect();
+    Ok(Report { answered: Arc::new(answered), parameters, verdicts })
 }
 
 /// Identifies a campaign or recordings on disk.
@@ -123,10 +156,13 @@ pub(crate) fn identify_files(
     sensor: bool,
     device: Option<String>,
     effects: Vec<PathBuf>,
+    limits_file: Option<PathBuf>,
+    limits_text: Option<String>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
     let settings = Settings { naming: naming(py, &map)?, settle_s: settle, sensor, device };
-    answered(py, progress.as_ref(), effects, move || service::campaign_of_files(&files, &holdout, &settings))
+    let asked = Asked { effects, limits_file, limits_text };
+    answered(py, progress.as_ref(), asked, move || service::campaign_of_files(&files, &holdout, &settings))
 }
 
 /// Identifies recordings in memory: names and what has columns, with the text of a campaign where one says what they are.
@@ -142,11 +178,14 @@ pub(crate) fn identify_runs(
     sensor: bool,
     device: Option<String>,
     effects: Vec<PathBuf>,
+    limits_file: Option<PathBuf>,
+    limits_text: Option<String>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
     let settings = Settings { naming: naming(py, &map)?, settle_s: settle, sensor, device };
+    let asked = Asked { effects, limits_file, limits_text };
     let runs = taken(runs)?;
-    answered(py, progress.as_ref(), effects, move || match text {
+    answered(py, progress.as_ref(), asked, move || match text {
         Some(text) => service::campaign_of_text(&text, runs.into_iter().collect::<BTreeMap<_, _>>(), &settings),
         None => service::campaign_of_columns(runs, held_out, &settings),
     })

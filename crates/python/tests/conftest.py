@@ -59,13 +59,17 @@ def command() -> str:
 
 @pytest.fixture(scope="session")
 def cli():
-    """The command, with its standard output."""
+    """The command, with its standard output; `cli.said` has all that it said."""
 
-    def run(*arguments: object, stdin: bytes | None = None, status: int = 0) -> str:
+    def said(*arguments: object, stdin: bytes | None = None, status: int = 0) -> subprocess.CompletedProcess[bytes]:
         done = subprocess.run([command(), *map(str, arguments)], input=stdin, capture_output=True, check=False)
         assert done.returncode == status, done.stderr.decode()
-        return done.stdout.decode()
+        return done
 
+    def run(*arguments: object, stdin: bytes | None = None, status: int = 0) -> str:
+        return said(*arguments, stdin=stdin, status=status).stdout.decode()
+
+    run.said = said
     return run
 
 

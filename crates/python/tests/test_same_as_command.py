@@ -107,3 +107,45 @@ def test_compensation_effects_and_inspection_are_those_of_the_command(folder, cl
     assert cvg.inspect(recording) == json.loads(cli("inspect", recording, "--json"))
     [inside] = cvg.inspect(frames, name=str(recording))
     assert inside == cvg.inspect(recording)[0]
+
+
+def test_limits_have_the_verdicts_of_the_command_line_by_line(folder, cli, tmp_path):
+    said = {
+        "heldout.discovered.rms_deg": {"max": 0.01},
+        "angular_gain.value": {"max": numpy.float64(0.7)},
+        "detection_gain_ratio.value": {"min": 0.97, "max": 1.03},
+        "runs.rot+500.csv.spikes": {"max": 3},
+        "allan.bias_instability_dph.value": {"max": 1.0},
+    }
+    file = tmp_path / "limits.toml"
+    numbers = {place: ", ".join(f"{end} = {float(v)}" for end, v in ends.items()) for place, ends in said.items()}
+    file.write_text("".join(f'"{place}" = {{ {ends} }}\n' for place, ends in numbers.items()))
+    expected = cli.said("identify", folder / "campaign.toml", "--json", "--limits", file, status=1)
+    lines = [line for line in expected.stderr.decode().splitlines() if line[:4] in ("pass", "FAIL")]
+    for limits in (file, str(file), said):
+        report = cvg.identify(folder / "campaign.toml", limits=limits)
+        assert report.to_json() + "\n" == expected.stdout.decode()
+        assert sorted(map(str, report.verdicts)) == sorted(lines) and len(lines) == len(said)
+        assert report.is_within_limits is False
+    of_file = cvg.identify(folder / "campaign.toml", limits=file).verdicts
+    assert [str(verdict) for verdict in of_file] == lines
+    kept = cvg.identify(frame(folder, "rot+500.csv"), limits={"angular_gain.value": {"min": 0.7, "max": 0.9}})
+    assert kept.is_within_limits is True and kept.verdicts[0].value == kept.angular_gain["value"]
+    assert cvg.identify(frame(folder, "rot+500.csv")).is_within_limits is None
+
+
+def test_limits_that_cannot_be_meant_are_errors_with_the_words_of_the_command(folder, cli, tmp_path):
+    file = tmp_path / "limits.toml"
+    for text, part in (
+        ('"heldout.discovered.rms" = { max = 1 }\n', "names no number of the report"),
+        ('"angular_gain.value" = { min = 1, max = 0 }\n', "min is above max"),
+        ("", "there is no limit"),
+    ):
+        file.write_text(text)
+        said = cli.said("identify", folder / "campaign.toml", "--limits", file, status=2).stderr.decode()
+        with pytest.raises(cvg.InputError, match=part) as raised:
+            cvg.identify(folder / "campaign.toml", limits=file)
+        assert str(raised.value) in said
+    for wrong in ({}, {"angular_gain.value": {"max": "1"}}, {"angular_gain.value": {"max": True}}, {"angular_gain.value": 1.0}):
+        with pytest.raises(cvg.InputError, match="limits"):
+            cvg.identify(folder / "campaign.toml", limits=wrong)

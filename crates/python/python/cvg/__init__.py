@@ -17,8 +17,9 @@ from typing import Any
 from . import _cvg
 from ._cvg import Instrument, Simulation, Table, __version__
 from ._errors import Error, InputError, NoAnswer
-from ._input import Data, Map, Path, Run, entries, is_path, paths, runs, several, text
-from ._report import Calibration, Parameter, Report
+from ._input import Data, Limits, Map, Path, Run, entries, is_path, paths, runs, several, text
+from ._input import limits as _limits
+from ._report import Calibration, Parameter, Report, Verdict
 
 __all__ = [
     "Calibration",
@@ -31,6 +32,7 @@ __all__ = [
     "Run",
     "Simulation",
     "Table",
+    "Verdict",
     "__version__",
     "effects",
     "identify",
@@ -50,6 +52,7 @@ def identify(
     name: str | None = None,
     campaign: Mapping[str, object] | None = None,
     effects: Path | Iterable[Path] = (),
+    limits: Limits = None,
     progress: Callable[[str], object] | None = None,
 ) -> Report:
     """Identifies an instrument.
@@ -59,13 +62,15 @@ def identify(
 
     `map`, `holdout`, `settle`, `sensor` and `effects` are the options of `cvg identify`. `name` is what a frame is called in
     the report, `device` the instrument. `campaign` holds keys of a campaign file's table `campaign`, such as
-    `{"carrier_hz": 15200.0}`. `progress` is told what is going on. Other threads of Python run meanwhile, and a
+    `{"carrier_hz": 15200.0}`. `limits` is a limits file, or what it says as a mapping,
+    `{"heldout.discovered.rms_deg": {"max": 0.01}}`: `report.verdicts` has the command's, and nothing is raised where one
+    fails. `progress` is told what is going on. Other threads of Python run meanwhile, and a
     KeyboardInterrupt ends it.
 
     Raises `InputError` where the input has to be mended, `NoAnswer` where it does not carry one.
     """
     files = paths(several(effects) if is_path(effects) else list(effects))  # type: ignore[arg-type]
-    options = (entries(map), settle, sensor, device, files, progress)
+    options = (entries(map), settle, sensor, device, files, *_limits(limits), progress)
     if isinstance(x, Simulation):
         return Report(_cvg.identify_runs(x.recordings, 0, x.campaign_toml, *options))
     given, held = several(x), several(holdout)

@@ -8,11 +8,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Union
 
+from ._errors import InputError
+
 Path = Union[str, "os.PathLike[str]"]
 #: a frame of pandas or polars, an Arrow table, or columns by their names
 Data = Any
 #: which column is which channel: {"t_s": "Time (ms)*0.001"}, or "t_s=Time (ms)*0.001" one by one
 Map = Union[Mapping[str, str], Iterable[str], None]
+#: a limits file, or what it says: {"heldout.discovered.rms_deg": {"max": 0.01}}
+Limits = Union[Path, Mapping[str, Mapping[str, float]], None]
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,29 @@ def entries(columns: Map) -> list[str]:
     if isinstance(columns, str):
         return [columns]
     return list(columns)
+
+
+def limits(x: Limits) -> tuple[str | None, str | None]:
+    """Limits as a file, or as the text of one."""
+    if x is None:
+        return None, None
+    if isinstance(x, Mapping):
+        if not all(isinstance(ends, Mapping) for ends in x.values()):
+            raise InputError("limits: wanted a mapping with min, max or both for each number of the report")
+        lines = (f"{_toml(place)} = {_inline(ends)}" for place, ends in x.items())
+        return None, "\n".join(lines)
+    return os.fspath(x), None
+
+
+def _inline(ends: Mapping[str, float]) -> str:
+    return "{ " + ", ".join(f"{_toml(end)} = {_number(value)}" for end, value in ends.items()) + " }"
+
+
+def _number(value: object) -> str:
+    # numpy's numbers are numbers as well
+    if isinstance(value, (str, bool)) or not hasattr(value, "__float__"):
+        return _toml(str(value))
+    return repr(float(value))
 
 
 def runs(x: Sequence[object], first: int = 1) -> list[Run]:

@@ -21,6 +21,21 @@ class Parameter(NamedTuple):
     high: float | None
 
 
+class Verdict(NamedTuple):
+    """A number of a report, held against its limit; `line` is what the command says of it."""
+
+    name: str
+    #: none where the report does not tell it, which does not pass
+    value: float | None
+    min: float | None
+    max: float | None
+    passes: bool
+    line: str
+
+    def __str__(self) -> str:
+        return self.line
+
+
 class Calibration:
     """What undoes the errors of an instrument; calibration.toml."""
 
@@ -106,6 +121,17 @@ class Report:
     def parameters(self) -> list[Parameter]:
         """Each number that was told, with its interval."""
         return [Parameter(*p) for p in self._native.parameters()]
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """Each limit that was asked for, in the order of the command's lines."""
+        return [Verdict(*v) for v in self._native.verdicts()]
+
+    @property
+    def is_within_limits(self) -> bool | None:
+        """Whether every limit holds; none where none was asked for."""
+        verdicts = self.verdicts
+        return all(v.passes for v in verdicts) if verdicts else None
 
     def to_frame(self) -> Any:
         """The parameters as a frame of pandas, or of polars where that alone is there."""

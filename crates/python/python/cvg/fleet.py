@@ -99,8 +99,11 @@ def identify_device(x: Any, **options: Any) -> pa.Table:
     """Answers one device: a row of `SCHEMA`.
 
     `x` is the path of a campaign or a recording, or an Arrow table (or what `pyarrow.table` makes one of) of one device's
-    rows, with its recordings told apart by a column `run`. `options` are those of `cvg.identify`.
+    rows, with its recordings told apart by a column `run`. `options` are those of `cvg.identify`, but for `limits`, of which a row
+    says nothing.
     """
+    if options.get("limits") is not None:
+        raise InputError("limits: a row does not say how they were met; wanted cvg.identify, or `cvg fleet --limits`")
     device = os.fspath(x) if is_path(x) else "device"
     try:
         if is_path(x):
