@@ -1,19 +1,21 @@
-//! Any bytes as Parquet, MATLAB's `.mat` or HDF5, by their first bytes: read or refused, never a panic that leaves the
-//! reader; what is read is as promised and can be written.
+//! Any bytes as Parquet, MATLAB's `.mat` or HDF5, or what gzip makes of them and of text, by their first bytes: read or
+//! refused, never a panic that leaves the reader; what is read is as promised and can be written. Parquet also as a lake of
+//! devices, whose columns are of one length.
 
 use std::fs;
 use std::path::Path;
 use std::sync::{LazyLock, Once};
 
-use cvg_calibration::recording::{Naming, Recording};
+use cvg_recording::{Lake, Naming, ReadError, Recording, limit_memory};
 use tempfile::TempDir;
 
-use super::csv::as_promised;
+use super::csv::{ALLOWED, admitted, as_promised};
 
 static FOLDER: LazyLock<TempDir> = LazyLock::new(|| TempDir::new().expect("a temporary folder"));
 static QUIET: Once = Once::new();
 
 pub fn run(bytes: &[u8]) {
+    limit_memory(ALLOWED);
     // of a decoder's panic the reader makes a refusal; nobody wants to read of each
     QUIET.call_once(|| {
         let hook = std::panic::take_hook();
@@ -29,14 +31,31 @@ pub fn run(bytes: &[u8]) {
         // Parquet is read from its end
         let path = FOLDER.path().join(format!("{:?}.parquet", std::thread::current().id()));
         fs::write(&path, bytes).expect("a temporary file");
+        lake(&path);
         Recording::read(&path)
-    } else if bytes.starts_with(b"MATLAB") || bytes.starts_with(b"\x89HDF") {
+    } else if [&b"MATLAB"[..], b"\x89HDF", b"\x1f\x8b"].iter().any(|head| bytes.starts_with(head)) {
         Recording::read_from(bytes, &Naming::default(), Path::new("fuzz.mat"))
     } else {
         return;
     };
-    let Ok(recording) = read else { return };
+    let Some(recording) = admitted(read) else { return };
     as_promised(&recording);
     recording.write_csv(std::io::sink()).expect("what was read can be written");
     recording.write_parquet(std::io::sink()).expect("what was read can be written");
+}
+
+/// Takes the file as one of many devices.
+fn lake(path: &Path) {
+    let Some(Some(lake)) = admitted(Lake::open(path)) else { return };
+    let known: Vec<String> = lake.devices().map(str::to_owned).collect();
+    let given = lake.each::<ReadError>(|device, columns| {
+        assert!(known.contains(&device));
+        let is_even = columns.windows(2).all(|pair| pair[0].1.len() == pair[1].1.len());
+        assert!(is_even, "columns of one device have one length");
+        if let Some(recording) = admitted(Recording::of_columns(columns, Naming::NONE, path)) {
+            as_promised(&recording);
+        }
+        Ok(())
+    });
+    admitted(given);
 }

@@ -321,7 +321,8 @@ impl Campaign {
         self.warnings.iter().chain(recordings).map(String::as_str)
     }
 
-    /// The campaign file that says this, with the runs' files as [`Run::file`] names them.
+    /// The campaign file that says this, with the runs' files as [`Run::file`] names them. It goes with the recordings as they
+    /// are written: what a campaign file says of their columns or of a constant rate is in these.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = format!("[campaign]\ndevice = {}\n", quoted(&self.device));
