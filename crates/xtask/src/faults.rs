@@ -10,6 +10,7 @@ mod edges;
 mod estimator;
 mod instrument;
 mod model;
+mod single;
 mod unseen;
 
 use std::collections::BTreeSet;
@@ -55,6 +56,7 @@ fn library() -> Vec<Fault> {
         instrument::FAULTS,
         edges::FAULTS,
         unseen::FAULTS,
+        single::FAULTS,
     ]
     .concat()
 }

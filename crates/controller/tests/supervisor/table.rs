@@ -1,7 +1,29 @@
 //! The supervisor a second time, as the specification tells it: from any state and for any window, on both sides of every
-//! bound, one step is that of the table here. What is left out by each is what the other would show.
+//! bound, one step is that of the table here, in both precisions. What is left out by each is what the other would show.
 
 use super::*;
+use cvg_model::Float;
+
+/// A number with its neighbours.
+trait Scalar: Float {
+    fn neighbours(self) -> [Self; 2];
+}
+
+impl Scalar for f32 {
+    fn neighbours(self) -> [Self; 2] {
+        [self.next_up(), self.next_down()]
+    }
+}
+
+impl Scalar for f64 {
+    fn neighbours(self) -> [Self; 2] {
+        [self.next_up(), self.next_down()]
+    }
+}
+
+fn t<T: Float>(v: f64) -> T {
+    T::from_f64(v)
+}
 
 /// xorshift64*: any state is as likely as any other.
 struct Dice(u64);
@@ -76,17 +98,18 @@ fn any_state(dice: &mut Dice) -> SupervisorState {
 }
 
 /// A number, one of its neighbours, or its opposite.
-fn near(dice: &mut Dice, v: f64) -> f64 {
-    let v = dice.of(&[v, v.next_up(), v.next_down()]);
+fn near<T: Scalar>(dice: &mut Dice, v: T) -> T {
+    let [up, down] = v.neighbours();
+    let v = dice.of(&[v, up, down]);
     dice.of(&[v, v, -v])
 }
 
-fn any_window(dice: &mut Dice) -> Observation<f64> {
+fn any_window<T: Scalar>(dice: &mut Dice) -> Observation<T> {
     let e = dice.of(&[SET_2, SET_2, SET_2, 0.25 * SET_2, 2.25 * SET_2, 20.0, 30.0, LEAST, 1.0, 0.0, f64::INFINITY]);
-    let e = if dice.rarely() { near(dice, e).abs() } else { e };
+    let e = if dice.rarely() { near(dice, t::<T>(e)).magnitude() } else { t(e) };
     let share = |dice: &mut Dice, shares: &[f64]| {
         let share = dice.of(shares);
-        near(dice, share * e)
+        near(dice, t::<T>(share) * e)
     };
     let q = share(dice, &[0.0, 0.0, 1.0 / 32.0, 1.0 / 16.0, 0.1, 0.5, 0.6]);
     let l = share(dice, &[0.0, 0.0, 1.0 / 32.0, 1.0 / 16.0, 0.2, 0.5, 0.6]);
@@ -94,9 +117,9 @@ fn any_window(dice: &mut Dice) -> Observation<f64> {
     let mut pendulum = Pendulum { e, q, r, s, l };
     if dice.rarely() {
         match dice.of(&[0, 1, 2]) {
-            0 => pendulum.e = f64::NAN,
-            1 => pendulum.q = f64::NAN,
-            _ => pendulum.l = f64::NAN,
+            0 => pendulum.e = t(f64::NAN),
+            1 => pendulum.q = t(f64::NAN),
+            _ => pendulum.l = t(f64::NAN),
         }
     }
     Observation {
@@ -108,11 +131,13 @@ fn any_window(dice: &mut Dice) -> Observation<f64> {
     }
 }
 
-fn any_beat(dice: &mut Dice) -> Option<Beat<f64>> {
+fn any_beat<T: Scalar>(dice: &mut Dice) -> Option<Beat<T>> {
     // eight windows of 0.25 V² are heard above 2 V², and a channel of a 400th is dead
-    let sums =
-        [(9.0, 9.0), (1.0, 1.0), (1.0, 1.0_f64.next_up()), (399.0, 1.0), (1.0, 399.0), (0.9, 399.1), (399.1, 0.9)];
-    let (x2, y2) = dice.of(&sums);
+    let sums = [(9.0, 9.0), (1.0, 1.0), (1.0, 1.0), (399.0, 1.0), (1.0, 399.0), (0.9, 399.1), (399.1, 0.9)];
+    let which = dice.of(&[0, 1, 2, 3, 4, 5, 6]);
+    let (x2, y2) = (t(sums[which].0), t::<T>(sums[which].1));
+    // two and a unit more in the last place of their sum
+    let y2 = if which == 2 { y2.neighbours()[0].neighbours()[0] } else { y2 };
     if dice.rarely() { None } else { Some(Beat { x2, y2, windows: 8 }) }
 }
 
@@ -125,12 +150,16 @@ fn wished(wish: Wish) -> Mode {
     }
 }
 
-fn run(mode: Mode) -> Orders<f64> {
-    match mode {
-        Mode::Hold => RUN_HELD,
-        Mode::RingDown => RUN_DOWN,
-        _ => RUN,
-    }
+fn run<T>(mode: Mode) -> Orders<T> {
+    Orders::Run { hold: mode == Mode::Hold || mode == Mode::RingDown, ring_down: mode == Mode::RingDown }
+}
+
+fn half<T: Float>(v: T) -> T {
+    v / t(2.0)
+}
+
+fn is_nan<T: Float>(v: T) -> bool {
+    v.to_f64().is_nan()
 }
 
 /// One window of the table: what is next, and what the loops are to do.
@@ -139,13 +168,13 @@ struct Table {
 }
 
 impl Table {
-    fn fault(&mut self, fault: Fault) -> Orders<f64> {
+    fn fault<T: Scalar>(&mut self, fault: Fault) -> Orders<T> {
         (self.s.mode, self.s.fault, self.s.windows, self.s.good) = (Mode::Fault, Some(fault), 0, 0);
         (self.s.bad, self.s.coasts, self.s.trying) = (0, 0, 0);
         Orders::Rest
     }
 
-    fn to(&mut self, mode: Mode, orders: Orders<f64>) -> Orders<f64> {
+    fn to<T: Scalar>(&mut self, mode: Mode, orders: Orders<T>) -> Orders<T> {
         (self.s.mode, self.s.windows, self.s.good) = (mode, 0, 0);
         orders
     }
@@ -156,11 +185,11 @@ impl Table {
         self.s.coasts > 50
     }
 
-    fn step(&mut self, o: &Observation<f64>, beat: Option<Beat<f64>>) -> Orders<f64> {
+    fn step<T: Scalar>(&mut self, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
         self.s.windows = self.s.windows.saturating_add(1);
         let p = &o.pendulum;
         let aligned = matches!(self.s.mode, Mode::WholeAngle | Mode::Hold) && wished(self.s.wish) == self.s.mode;
-        let bounded = p.e > 6.25 && p.e < 56.25 && p.q.abs() < p.e / 2.0 && p.l.abs() < p.e / 2.0;
+        let bounded = p.e > t(6.25) && p.e < t(56.25) && p.q.magnitude() < half(p.e) && p.l.magnitude() < half(p.e);
         let unblemished = o.valid && !o.clipped && !o.repeats && !o.jumped;
         if aligned && self.s.wish != Wish::Off && bounded && unblemished {
             self.s.repeats = 0;
@@ -192,7 +221,7 @@ impl Table {
     }
 
     /// What ends any mode but a fault.
-    fn ended(&mut self, o: &Observation<f64>) -> Option<Orders<f64>> {
+    fn ended<T: Scalar>(&mut self, o: &Observation<T>) -> Option<Orders<T>> {
         let named = |fault| if o.clipped { Fault::Saturated } else { fault };
         if self.s.repeats >= 20 {
             return Some(self.fault(named(Fault::StuckChannel)));
@@ -224,7 +253,7 @@ impl Table {
         None
     }
 
-    fn rest(&mut self, o: &Observation<f64>) -> Orders<f64> {
+    fn rest<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
         let tried_often = self.s.starts >= 2;
         let rest = if tried_often { REST * LONG_REST } else { REST };
         if !o.valid || o.clipped || self.s.repeats >= 20 || self.s.windows < rest {
@@ -237,12 +266,12 @@ impl Table {
         self.to(Mode::Listen, Orders::Rest)
     }
 
-    fn listen(&mut self, beat: Option<Beat<f64>>) -> Orders<f64> {
+    fn listen<T: Scalar>(&mut self, beat: Option<Beat<T>>) -> Orders<T> {
         let Some(beat) = beat.filter(|_| self.s.windows >= LISTEN) else { return Orders::Listen };
         let both = beat.x2 + beat.y2;
-        let heard = both > f64::from(beat.windows) * 0.25;
+        let heard = both > t(f64::from(beat.windows) * 0.25);
         let driven = self.s.sweeps > 0 || self.s.fault == Some(Fault::DeadChannel);
-        let dead = driven && beat.x2.min(beat.y2) < both / 400.0;
+        let dead = driven && (if beat.x2 < beat.y2 { beat.x2 } else { beat.y2 }) < both * T::ratio(1, 400);
         match (heard, dead) {
             (true, false) => self.to(Mode::Lock, Orders::Tune),
             _ if self.s.sweeps < 3 => self.to(Mode::Sweep, Orders::Rest),
@@ -251,33 +280,36 @@ impl Table {
         }
     }
 
-    fn sweep(&mut self) -> Orders<f64> {
+    fn sweep<T: Scalar>(&mut self) -> Orders<T> {
         let length = SWEEP << self.s.sweeps.min(8);
         if self.s.windows >= length {
             self.s.sweeps = self.s.sweeps.saturating_add(1);
             return self.to(Mode::Listen, Orders::Rest);
         }
-        let share = f64::from(self.s.windows) / f64::from(length);
-        Orders::Sweep { correction_rad_s: 100.0 * (2.0 * share - 1.0), opposed: self.s.sweeps % 2 == 1 }
+        let share = t::<T>(f64::from(self.s.windows)) / t(f64::from(length));
+        Orders::Sweep {
+            correction_rad_s: t::<T>(100.0) * (t::<T>(2.0) * share - t(1.0)),
+            opposed: self.s.sweeps % 2 == 1,
+        }
     }
 
-    fn lock(&mut self, o: &Observation<f64>) -> Orders<f64> {
+    fn lock<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
         let p = &o.pendulum;
-        if 4.0 * p.e < 0.25 {
+        if t::<T>(4.0) * p.e < t(0.25) {
             return self.to(Mode::Listen, Orders::Rest);
         }
         if self.s.windows == 1 {
             return Orders::Snap;
         }
-        self.s.good = if p.l.abs() < 0.2 * p.e { self.s.good.saturating_add(1) } else { 0 };
+        self.s.good = if p.l.magnitude() < t::<T>(0.2) * p.e { self.s.good.saturating_add(1) } else { 0 };
         if self.s.good >= 20 {
-            return self.to(Mode::SpinUp, RUN);
+            return self.to(Mode::SpinUp, run(Mode::WholeAngle));
         }
         if self.s.windows >= LOCK { self.fault(Fault::NoLock) } else { Orders::Lock }
     }
 
     /// The names of a vibration that is gone or jumped.
-    fn instead(o: &Observation<f64>, fault: Fault) -> Fault {
+    fn instead<T: Scalar>(o: &Observation<T>, fault: Fault) -> Fault {
         match (o.clipped, o.repeats) {
             (true, _) => Fault::Saturated,
             (_, true) => Fault::StuckChannel,
@@ -285,16 +317,16 @@ impl Table {
         }
     }
 
-    fn spin_up(&mut self, o: &Observation<f64>) -> Orders<f64> {
+    fn spin_up<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
         let p = &o.pendulum;
-        if 4.0 * p.e < 0.25 {
+        if t::<T>(4.0) * p.e < t(0.25) {
             return self.fault(Self::instead(o, Fault::AmplitudeLow));
         }
-        let there = (p.e - SET_2).abs() < 0.2 * SET_2 && p.q.abs() < 0.1 * p.e;
+        let there = (p.e - t(SET_2)).magnitude() < t::<T>(0.2) * t(SET_2) && p.q.magnitude() < t::<T>(0.1) * p.e;
         self.s.good = if there { self.s.good.saturating_add(1) } else { 0 };
         if self.s.good >= 20 {
             self.s.sweeps = 0;
-            if self.s.cause == Some(Fault::DeadChannel) && p.s.abs() < p.r.abs() * (1.0 / 30.0) {
+            if self.s.cause == Some(Fault::DeadChannel) && p.s.magnitude() < p.r.magnitude() * T::ratio(1, 30) {
                 return self.fault(Fault::DeadChannel);
             }
             let mode = wished(self.s.wish);
@@ -306,10 +338,10 @@ impl Table {
         if self.s.windows >= SPIN_UP {
             return self.fault(Fault::NoSpinUp);
         }
-        if self.s.wish == Wish::WholeAngle { RUN } else { RUN_HELD }
+        run(if self.s.wish == Wish::WholeAngle { Mode::WholeAngle } else { Mode::Hold })
     }
 
-    fn coast(&mut self, o: &Observation<f64>) -> Orders<f64> {
+    fn coast<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
         if !o.valid {
             self.s.good = 0;
             if self.s.windows >= COAST {
@@ -318,24 +350,24 @@ impl Table {
             return Orders::Rest;
         }
         self.s.good = self.s.good.saturating_add(1);
-        match (self.s.good >= 2, 4.0 * o.pendulum.e < 0.25) {
+        match (self.s.good >= 2, t::<T>(4.0) * o.pendulum.e < t(0.25)) {
             (false, _) => Orders::Rest,
             (true, true) => self.to(Mode::Listen, Orders::Rest),
             (true, false) => self.to(Mode::Lock, Orders::Snap),
         }
     }
 
-    fn operate(&mut self, o: &Observation<f64>) -> Orders<f64> {
+    fn operate<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
         let p = &o.pendulum;
         if o.jumped {
             let cause = Self::instead(o, Fault::DeadChannel);
             self.s.cause = Some(cause);
             return if self.interrupted() { self.fault(cause) } else { self.to(Mode::Coast, Orders::Rest) };
         }
-        if 4.0 * p.e < 0.25 {
+        if t::<T>(4.0) * p.e < t(0.25) {
             return self.fault(Self::instead(o, Fault::AmplitudeLow));
         }
-        let (mode, low) = (self.s.mode, p.e < 6.25);
+        let (mode, low) = (self.s.mode, p.e < t(6.25));
         if wished(self.s.wish) != mode {
             self.s.trying = 0;
             let next = if low { Mode::SpinUp } else { wished(self.s.wish) };
@@ -350,8 +382,8 @@ impl Table {
         run(mode)
     }
 
-    fn bounds(&mut self, p: &Pendulum<f64>, low: bool) -> Option<Orders<f64>> {
-        let in_phase = p.l.abs() < p.e / 2.0;
+    fn bounds<T: Scalar>(&mut self, p: &Pendulum<T>, low: bool) -> Option<Orders<T>> {
+        let in_phase = p.l.magnitude() < half(p.e);
         if !in_phase {
             return Some(if self.interrupted() {
                 self.fault(Fault::NoLock)
@@ -360,9 +392,9 @@ impl Table {
             });
         }
         let names = [
-            (p.e > 56.25 || p.e.is_nan(), Fault::AmplitudeHigh),
+            (p.e > t(56.25) || is_nan(p.e), Fault::AmplitudeHigh),
             (low, Fault::AmplitudeLow),
-            (p.q.is_nan() || p.q.abs() >= p.e / 2.0, Fault::QuadratureHigh),
+            (is_nan(p.q) || p.q.magnitude() >= half(p.e), Fault::QuadratureHigh),
         ];
         let (_, fault) = names.into_iter().find(|(out, _)| *out)?;
         self.s.bad = self.s.bad.saturating_add(1);
@@ -370,13 +402,12 @@ impl Table {
     }
 }
 
-#[test]
-fn a_step_from_any_state_is_that_of_the_table() {
+fn a_step_is_that_of_the_table<T: Scalar>() {
     let mut dice = Dice(0x9E37_79B9_7F4A_7C15);
-    let supervisor = supervisor();
+    let supervisor = Supervisor::<T>::new(&settings()).expect("valid");
     let mut passed = std::collections::BTreeSet::new();
     for _ in 0..400_000 {
-        let (before, o, beat) = (any_state(&mut dice), any_window(&mut dice), any_beat(&mut dice));
+        let (before, o, beat) = (any_state(&mut dice), any_window::<T>(&mut dice), any_beat(&mut dice));
         let (mut state, mut table) = (before, Table { s: before });
         let orders = supervisor.step(&mut state, &o, beat);
         let expected = table.step(&o, beat);
@@ -388,12 +419,17 @@ fn a_step_from_any_state_is_that_of_the_table() {
 }
 
 #[test]
-fn what_goes_on_is_counted_and_nothing_else() {
+fn a_step_from_any_state_is_that_of_the_table_in_both_precisions() {
+    a_step_is_that_of_the_table::<f32>();
+    a_step_is_that_of_the_table::<f64>();
+}
+
+fn what_goes_on_is_counted<T: Scalar>() {
     let mut dice = Dice(0xD1B5_4A32_D192_ED03);
-    let supervisor = supervisor();
+    let supervisor = Supervisor::<T>::new(&settings()).expect("valid");
     let mut on = 0;
     for _ in 0..400_000 {
-        let (before, o) = (any_state(&mut dice), any_window(&mut dice));
+        let (before, o) = (any_state(&mut dice), any_window::<T>(&mut dice));
         if !supervisor.goes_on(&before, &o.pendulum) {
             continue;
         }
@@ -406,6 +442,12 @@ fn what_goes_on_is_counted_and_nothing_else() {
         assert!(Supervisor::in_phase(&o.pendulum), "{before:?}\n{o:?}");
     }
     assert!(on > 500, "{on}");
+}
+
+#[test]
+fn what_goes_on_is_counted_and_nothing_else_in_both_precisions() {
+    what_goes_on_is_counted::<f32>();
+    what_goes_on_is_counted::<f64>();
 }
 
 #[test]
