@@ -79,6 +79,9 @@ try {
       const beyond = await page.$$eval("main > .scroll, main > section .scroll", (all) =>
         all.filter((s) => s.scrollWidth > s.clientWidth + 1).map((s) => s.getAttribute("aria-label")));
       assert.ok(width > 600 || beyond.length === 0, `${width} ${scheme}: tables cut off: ${beyond}`);
+      // cells of a narrow page say their column themselves
+      const heads = await page.$$eval("main > .scroll thead", (all) => all.filter((t) => t.getBoundingClientRect().width > 1).length);
+      assert.ok(width > 600 || heads === 0, `${width} ${scheme}: ${heads} heads of tables lie over their first rows`);
       const cut = await page.$$eval(".plot", (plots) => plots.flatMap((plot) => {
         const frame = plot.getBoundingClientRect();
         return [...plot.querySelectorAll("svg text")].filter((text) => {

@@ -248,7 +248,11 @@ pub(crate) fn drift_power(evaluation: &Evaluation) -> f64 {
     evaluation.segments.iter().zip(&evaluation.kept).map(|(s, kept)| of_segment(s, kept)).sum()
 }
 
-/// Amplitudes of harmonics 1 to `most`, fitted together, with 95 % intervals that allow for `inflation` of the variance
+/// Variance inflation of a harmonic by the others beyond which they are not told apart, as where the angle hardly turned
+/// (Marquardt 1970: ten).
+const LARGEST_VARIANCE_INFLATION: f64 = 10.0;
+
+/// Amplitudes of harmonics 1 to `most`, or as many as the angles tell apart, fitted together, with 95 % intervals that allow for `inflation` of the variance
 /// by autocorrelation.
 pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflation: f64) -> Vec<Harmonic> {
     let n = 2 * most as usize;
@@ -288,17 +292,20 @@ pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflati
             _ => sin_more + sin_less,
         }
     });
-    let Some(inverse) = normal.clone().cholesky().map(|c| c.inverse()) else { return Vec::new() };
-    let solution = &inverse * &right;
+    let Some(inverse) = told_apart(&normal) else { return Vec::new() };
+    let n = inverse.nrows();
+    let right = right.rows(0, n);
+    let solution = &inverse * right;
     let rest = (squares - solution.dot(&right)).max(0.0) / (count.saturating_sub(n)).max(1) as f64;
-    (0..most)
+    (0..n / 2)
         .map(|k| {
-            let (c, s) = (solution[2 * k as usize], solution[2 * k as usize + 1]);
-            let variance =
-                inverse[(2 * k as usize, 2 * k as usize)].max(inverse[(2 * k as usize + 1, 2 * k as usize + 1)]);
+            let (c, s) = (solution[2 * k], solution[2 * k + 1]);
+            let variance = inverse[(2 * k, 2 * k)].max(inverse[(2 * k + 1, 2 * k + 1)]);
+            #[allow(clippy::cast_possible_truncation, reason = "no more than were asked for")]
+            let n = k as u32 + 1;
             Harmonic {
                 of,
-                n: k + 1,
+                n,
                 amplitude_deg: c.hypot(s).to_degrees(),
                 ci95_deg: 1.96 * (variance * rest * inflation).sqrt().to_degrees(),
                 // c cos nθ + s sin nθ = A cos(nθ + phase) with c = A cos phase, s = −A sin phase
@@ -306,6 +313,16 @@ pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflati
             }
         })
         .collect()
+}
+
+/// The inverse of the normal equations of as many harmonics as the angles tell apart; `None` where not even the first is.
+fn told_apart(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    (1..=normal.nrows() / 2).rev().find_map(|most| {
+        let normal = normal.view((0, 0), (2 * most, 2 * most));
+        let inverse = normal.clone_owned().cholesky()?.inverse();
+        let inflated = |i: usize| normal[(i, i)] * inverse[(i, i)];
+        (0..2 * most).all(|i| inflated(i) <= LARGEST_VARIANCE_INFLATION).then_some(inverse)
+    })
 }
 
 /// Harmonics that are reported.
@@ -385,6 +402,18 @@ mod tests {
             assert!((h.phase_deg.to_radians() - phase).abs() < 1e-9, "{h:?}");
         }
         assert!([0, 3, 4, 5, 6].into_iter().all(|at| found[at].amplitude_deg < 1e-9), "{found:?}");
+    }
+
+    #[test]
+    fn a_harmonic_that_angles_do_not_tell_from_the_others_is_none() {
+        let mut e = evaluation(|d| 3e-3 * (2.0 * d + 0.5).cos());
+        assert_eq!(harmonics(&e, Follows::Pattern, 8, 1.0).len(), 8);
+        // a sixth of a turn
+        e.segments[0].direction.iter_mut().for_each(|d| *d /= 6.0);
+        assert!(harmonics(&e, Follows::Pattern, 8, 1.0).len() < 8);
+        assert!(harmonics(&e, Follows::Pattern, 8, 1.0).iter().all(|h| h.amplitude_deg < 1.0));
+        e.segments[0].direction.fill(0.3);
+        assert!(harmonics(&e, Follows::Pattern, 8, 1.0).is_empty());
     }
 
     #[test]

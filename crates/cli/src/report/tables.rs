@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cvg_calibration::Identification;
-use cvg_calibration::report::{Estimate, Report, RunReport, Temperature};
+use cvg_calibration::report::{EffectReport, Estimate, ParameterReport, Report, RunReport, Temperature};
 
 use super::escape;
 use super::figures::run_name;
@@ -121,16 +121,43 @@ fn parameters(h: &mut String, identified: &Identification) {
             "actuation_gain_ratio" => r.actuation_gain_ratio.is_none(),
             _ => true,
         };
-        let all = r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p)));
-        for (e, p) in all.filter(|(_, p)| once(&p.name)) {
-            let name = format!("{}: {}", escape(&e.id), escape(&p.name));
-            let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
-                Some([value, low, high]) => (value, format!("{low} … {high}")),
-                None => (significant(p.value), "set by a search".to_owned()),
-            };
-            row(h, &[&name, &value, &ends, &escape(&p.unit)]);
+        for e in &r.effects {
+            match harmonics_of_a_table(e) {
+                Some((order, largest)) => {
+                    let size = format!("largest {} at {}", significant(largest.1), largest.0);
+                    row(h, &[ANGLE_TABLE, &format!("{order} harmonics"), &size, "rad"]);
+                }
+                None => e.parameters.iter().filter(|p| once(&p.name)).for_each(|p| parameter(h, e, p)),
+            }
         }
     });
+    if let Some(e) = r.effects.iter().find(|e| harmonics_of_a_table(e).is_some()) {
+        h.push_str("<details><summary>Coefficients of the angle table</summary>");
+        table(h, "Coefficients of the angle table", &["parameter", "value", "95 % interval", "unit"], |h| {
+            e.parameters.iter().for_each(|p| parameter(h, e, p));
+        });
+        h.push_str("</details>");
+    }
+}
+
+/// The effect whose parameters are a series, two for each harmonic, and many.
+const ANGLE_TABLE: &str = "angle-table";
+
+/// How many harmonics a table has, and which is the largest: its number and amplitude.
+fn harmonics_of_a_table(e: &EffectReport) -> Option<(usize, (usize, f64))> {
+    let pairs = e.parameters.chunks_exact(2).filter(|_| e.id == ANGLE_TABLE);
+    let amplitudes = pairs.map(|p| p[0].value.hypot(p[1].value)).enumerate().map(|(at, a)| (at + 1, a));
+    let largest = amplitudes.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((e.parameters.len() / 2, largest))
+}
+
+fn parameter(h: &mut String, e: &EffectReport, p: &ParameterReport) {
+    let name = format!("{}: {}", escape(&e.id), escape(&p.name));
+    let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
+        Some([value, low, high]) => (value, format!("{low} … {high}")),
+        None => (significant(p.value), "set by a search".to_owned()),
+    };
+    row(h, &[&name, &value, &ends, &escape(&p.unit)]);
 }
 
 fn correlations(h: &mut String, identified: &Identification) {
