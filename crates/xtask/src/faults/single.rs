@@ -5,6 +5,9 @@ use super::{Fault, fault};
 const ESTIMATOR: (&str, &str) = ("cvg-estimator", "precision");
 const CONTROLLER: (&str, &str) = ("cvg-controller", "precision");
 const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
+const EQUATIONS: (&str, &str) = ("cvg-model", "equations");
+const SCALAR: (&str, &str) = ("cvg-model", "scalar");
+const MODEL: (&str, &str) = ("cvg-model", "effects_in_single_precision");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -265,5 +268,27 @@ pub(super) const FAULTS: &[Fault] = &[
         "let held = if known { state.within_rad } else { T::zero() };",
         "let held = if known && !(core::mem::size_of::<T>() == 4) { state.within_rad } else { T::zero() };",
         ESTIMATOR,
+    ),
+    fault(
+        "in single precision the angle below the axis is that above",
+        "model/src/pendulum.rs",
+        "T::half() * self.s.atan2(self.r)",
+        "T::half() * if T::epsilon() > T::ratio(1, 1 << 30) && self.r < T::zero() && self.s < T::zero() { -self.s } else { self.s }.atan2(self.r)",
+        EQUATIONS,
+    ),
+    fault(
+        "in single precision the error is even",
+        "model/src/detection.rs",
+        "(m * sin_2theta).atan2(p - m * cos_2theta)",
+        "(m * if T::epsilon() > T::ratio(1, 1 << 30) && sin_2theta < T::zero() { -sin_2theta } else { sin_2theta }).atan2(p - m * cos_2theta)",
+        EQUATIONS,
+    ),
+    fault("infinity is finite", "model/src/scalar.rs", "<$t>::is_finite(self)", "self == self", SCALAR),
+    fault(
+        "in single precision a feed-through is undone in phase only",
+        "model/src/effects/drive_feedthrough.rs",
+        "y_in * f.y_s - y_quad * f.y_c,",
+        "if T::epsilon() > T::ratio(1, 1 << 30) { T::zero() } else { y_in * f.y_s - y_quad * f.y_c },",
+        MODEL,
     ),
 ];
