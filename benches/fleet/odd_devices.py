@@ -28,47 +28,19 @@ ODD = [
     ("detection-gain-mismatch", ""),
     ("actuation-gain-mismatch", ""),
 ]
-RUNS = """
-[[run]]
-kind = "rotation"
-file = "rot+500.csv"
-rate_dps = 500.0
-duration_s = 4.0
-settle_s = 0.5
-
-[[run]]
-kind = "rotation"
-file = "rot-300.csv"
-rate_dps = -300.0
-duration_s = 4.0
-settle_s = 0.5
-
-[[run]]
-kind = "rotation"
-file = "check.csv"
-rate_dps = 400.0
-duration_s = 4.0
-settle_s = 0.5
-use = "holdout"
-
-[[run]]
-kind = "ringdown"
-file = "ringdown-0.csv"
-angle_deg = 0.0
-energy_off_s = 3.0
-duration_s = 8.0
-
-[[run]]
-kind = "ringdown"
-file = "ringdown-90.csv"
-angle_deg = 90.0
-energy_off_s = 3.0
-duration_s = 8.0
-"""
+#: name, kind, and what a scenario says of it
+RUNS = [
+    *((f"rot{rate:+}", "rotation", f"rate_dps = {rate}.0, settle_s = 0.5, duration_s = 4.0") for rate in (500, -300)),
+    ("check", "rotation", 'rate_dps = 400.0, settle_s = 0.5, duration_s = 4.0, use = "holdout"'),
+    *((f"ringdown-{at}", "ringdown", f"angle_deg = {at}.0, energy_off_s = 3.0, duration_s = 8.0") for at in (0, 90)),
+]
+#: devices of one seed and of the next have no number in common
+MOST_DEVICES = 1_000_000
 
 
-def scenario(number: int, odd: tuple[str, str] | None) -> str:
-    draw = random.Random(number)
+def scenario(number: int, odd: tuple[str, str] | None, seed: int) -> str:
+    own = (seed - 1) * MOST_DEVICES + number
+    draw = random.Random(own)
     # some devices are made less evenly than others: tails heavier than a normal distribution's
     spread = 3.0 if draw.random() < 0.05 else 1.0
     detection = 1.0132 + draw.gauss(0.0, 1e-3 * spread)
@@ -84,23 +56,25 @@ def scenario(number: int, odd: tuple[str, str] | None) -> str:
     ]
     if odd and odd[1]:
         effects.append(f'{{ id = "{odd[0]}", {odd[1]} }}')
+    runs = ", ".join(f'{{ kind = "{kind}", file = "{name}.csv", {said} }}' for name, kind, said in RUNS)
     return f"""
 device = "unit-{number:04}"
 angular_gain = {0.78 + draw.gauss(0.0, 5e-4)}
 angular_gain_stated = 0.78
 noise_v = {2e-5 * math.exp(draw.gauss(0.0, 0.2))}
 tau_s = {10.0 + draw.gauss(0.0, 0.3)}
-seed = {number}
+seed = {own}
 effects = [ {", ".join(effects)} ]
-{RUNS}"""
+run = [ {runs} ]
+"""
 
 
-def simulated(cvg: str, folder: pathlib.Path, number: int, odd: tuple[str, str] | None) -> None:
+def simulated(cvg: str, folder: pathlib.Path, number: int, odd: tuple[str, str] | None, seed: int) -> None:
     own = folder / "devices" / f"unit-{number:04}"
     if (own / "campaign.toml").exists():
         return
     text = folder / f"{number}.toml"
-    text.write_text(scenario(number, odd))
+    text.write_text(scenario(number, odd, seed))
     subprocess.run([cvg, "simulate", text, "--out", own], check=True, capture_output=True)
     text.unlink()
 
@@ -110,16 +84,17 @@ def main() -> None:
     parser.add_argument("cvg")
     parser.add_argument("--devices", type=int, default=2000)
     parser.add_argument("--every", type=int, default=100, help="one device in so many is odd")
+    parser.add_argument("--seed", type=int, default=1, help="another gives other devices, of which others are odd")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     said = parser.parse_args()
     said.out.mkdir(parents=True, exist_ok=True)
-    plant = random.Random(1)
+    plant = random.Random(said.seed)
     at = sorted(plant.sample(range(said.devices), max(1, said.devices // said.every)))
     planted = {number: ODD[place % len(ODD)] for place, number in enumerate(at)}
     with (said.out / "planted.csv").open("w") as file:
         csv.writer(file).writerows([f"unit-{number:04}", odd[0]] for number, odd in planted.items())
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda n: simulated(said.cvg, said.out, n, planted.get(n)), range(said.devices)))
+        list(pool.map(lambda n: simulated(said.cvg, said.out, n, planted.get(n), said.seed), range(said.devices)))
     answers = said.out / "answers"
     subprocess.run([said.cvg, "fleet", said.out / "devices", "--out", answers], check=True, stdout=subprocess.DEVNULL)
 
