@@ -110,7 +110,7 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
             continue;
         }
         let Some(why) = inconsistency(dataset, &fitted.fit, at) else { continue };
-        match rival_borne_out(dataset, fitted, at, &steps[own])? {
+        match rival_that_explains(dataset, fitted, at, &steps[own], leaves_no_more)? {
             Some((id, next)) => {
                 *fitted = next;
                 steps[own] = in_its_place(dataset, &fitted.fit, id, &steps[own]);
@@ -127,7 +127,7 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
 }
 
 /// A step with the rival that took its place.
-fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step {
+pub(super) fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step {
     let after = on_heldout(dataset, fit);
     let rms = after.mean_square().sqrt().to_degrees();
     let balance = balance(dataset, fit).map(f64::sqrt);
@@ -143,16 +143,21 @@ fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step
     }
 }
 
-/// The one rival of a member that every run bears out, fitted in its place, where it leaves no more of the held-out samples.
+/// Whether a fit leaves no more of the held-out samples than another.
+fn leaves_no_more(dataset: &Dataset, fit: &Fit, other: &Fit) -> bool {
+    heldout(dataset, fit) <= heldout(dataset, other)
+}
+
+/// The one rival of a member that every run bears out, fitted in its place, where it explains the samples as is asked for.
 /// Of two that do, neither is the cause for sure.
-fn rival_borne_out(
+pub(super) fn rival_that_explains(
     dataset: &mut Dataset,
     fitted: &Fitted,
     at: usize,
     step: &Step,
+    explains: impl Fn(&Dataset, &Fit, &Fit) -> bool,
 ) -> Result<Option<(EffectId, Fitted)>, Refusal> {
     let apart = Distinguishable::on(dataset);
-    let left = heldout(dataset, &fitted.fit);
     let mut found = None;
     for (id, _) in step.rivals.iter().filter(|(_, gain)| *gain >= LEAST_GAIN) {
         let candidate = Candidate { id: *id, values: id.neutral(), refine: None, tried: 1.0 };
@@ -164,7 +169,7 @@ fn rival_borne_out(
         hypothesis.members.remove(at);
         let place = hypothesis.admit(*id, Origin::Discovered);
         let next = fit_with_ring_downs(dataset, &hypothesis)?;
-        let borne_out = heldout(dataset, &next.fit) <= left && inconsistency(dataset, &next.fit, place).is_none();
+        let borne_out = explains(dataset, &next.fit, &fitted.fit) && inconsistency(dataset, &next.fit, place).is_none();
         if borne_out && found.replace((*id, next)).is_some() {
             found = None;
             break;

@@ -11,12 +11,13 @@ use rayon::prelude::*;
 use crate::diagnostics::evaluate::evaluate;
 use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::candidates;
-use crate::selection::consistency::ask_every_run;
+use crate::selection::consistency::{ask_every_run, in_its_place, rival_that_explains};
 use crate::selection::pairs::best_pair;
 use crate::selection::step::{Step, member_of, step_of};
 use crate::selection::trial::{
@@ -69,6 +70,14 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
     for own in 0..steps.len() {
         let at = member_of(&fitted.fit.hypothesis, own, steps);
         let Some(at) = at.filter(|_| steps[own].origin == Origin::Empirical) else { continue };
+        if !steps[own].contradicted
+            && let Some((id, next)) = rival_that_explains(dataset, fitted, at, &steps[own], explains_as_well)?
+        {
+            *fitted = next;
+            steps[own] = Step { origin: Origin::Discovered, ..in_its_place(dataset, &fitted.fit, id, &steps[own]) };
+            restore(dataset, fitted)?;
+            continue;
+        }
         let mut without = fitted.fit.hypothesis.clone();
         without.members.remove(at);
         let left = heldout(dataset, &fitted.fit);
@@ -82,6 +91,20 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
         }
     }
     Ok(())
+}
+
+/// Whether a fit explains the fitted samples no worse than another by what tells rivals apart, and the held-out ones within a
+/// standard error of their mean square, and the energy balance does not refute it.
+fn explains_as_well(dataset: &Dataset, fit: &Fit, other: &Fit) -> bool {
+    let balances = balance(dataset, other).zip(balance(dataset, fit));
+    if balances.is_some_and(|(before, after)| after > REFUTED * before) {
+        return false;
+    }
+    let [left, before] = [fit, other].map(|f| on_heldout(dataset, f));
+    let cost = sample_cost(&before);
+    let held_out = before.errors().count().max(1) as f64 / cost;
+    let lead = count(fit) / cost * (mean_square(fit) / mean_square(other)).ln();
+    lead < LEAST_LEAD && left.mean_square() <= (1.0 + (2.0 / held_out).sqrt()) * before.mean_square()
 }
 
 /// The best extension of a fitted hypothesis that earns its place.
