@@ -371,4 +371,12 @@ fn what_rust_refuses_c_is_refused_with_its_name() {
     Of::settings(&settings).map(|_| ()).expect_err("there is none of that name");
     let settings = Settings { readout: &raw const effect, readout_count: 5, ..in_c(&Rust::default()) };
     Of::settings(&settings).map(|_| ()).expect_err("more than there is room for");
+    let nameless = Effect { id: null(), values: [0.0; 4] };
+    let settings = Settings { readout: &raw const nameless, readout_count: 1, ..in_c(&Rust::default()) };
+    assert_eq!(Of::settings(&settings).err().as_deref(), Some("effects"), "an effect has a name");
+    // none where nothing is pointed to, whatever is counted, and where nothing is counted
+    for (readout, readout_count) in [(null(), 2), (&raw const nameless, 0)] {
+        let of = Of::settings(&Settings { readout, readout_count, ..in_c(&Rust::default()) }).expect("no effects");
+        assert_eq!(*of.instrument(), Instrument::new(&Rust::default()).expect("inside its domain"));
+    }
 }

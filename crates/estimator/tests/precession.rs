@@ -4,7 +4,7 @@ use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use approx::assert_abs_diff_eq;
 use cvg_estimator::{Direction, Movement, Precession, PrecessionState, Status};
-use cvg_model::Pendulum;
+use cvg_model::{Envelope, Pendulum};
 
 const WINDOW_S: f64 = 0.5;
 const SMOOTHING_S: f64 = 2.0;
@@ -281,4 +281,23 @@ fn a_jump_leaves_the_rate_that_was_known() {
         assert_eq!(state.sin_2_per_window, known);
         assert_abs_diff_eq!(state.degrees(), (0.3 + sense * 0.75_f64).to_degrees(), epsilon = 1e-12);
     }
+}
+
+#[test]
+fn a_state_of_anything_is_followed_from_the_second_window_on() {
+    let tracker = Precession::<f64>::new(5e-4, 8e-3, 35.0, 0.1, 0.0, 1e-3).expect("valid");
+    let p = Envelope::new(1.0, 0.0, 0.5, 0.0).pendulum();
+    for garbage in [1e30, -1e30, f64::NAN, f64::INFINITY] {
+        let mut state = PrecessionState { cos_2: garbage, sin_2: garbage, ..PrecessionState::default() };
+        assert_ne!(tracker.step(&mut state, &p), Movement::Steady, "{garbage}");
+        assert_eq!(tracker.step(&mut state, &p), Movement::Steady, "{garbage}");
+    }
+}
+
+#[test]
+fn a_pattern_on_an_axis_has_a_direction() {
+    for (cos_2, sin_2) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.6, 0.8)] {
+        assert!(PrecessionState { cos_2, sin_2, ..PrecessionState::<f64>::default() }.is_directed(), "{cos_2} {sin_2}");
+    }
+    assert!(!PrecessionState::<f64>::default().is_directed());
 }

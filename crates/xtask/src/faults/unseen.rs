@@ -4,6 +4,7 @@ use super::{Fault, fault};
 
 const ANGLE: (&str, &str) = ("cvg-estimator", "angle");
 const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
+const PRECESSION: (&str, &str) = ("cvg-estimator", "precession");
 const FORCES: (&str, &str) = ("cvg-controller", "forces");
 const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
 const OPEN_LOOP: (&str, &str) = ("cvg-instrument", "open_loop");
@@ -202,5 +203,33 @@ pub(super) const FAULTS: &[Fault] = &[
         "Err(Refused::Damaged) =>",
         "Err(Refused::Damaged) if { *s = c.start(); false } => cvg_record::CVG_RECORD_DAMAGED,\n        Err(Refused::Damaged) =>",
         LEARNING,
+    ),
+    fault(
+        "a direction after garbage is never kept",
+        "estimator/src/precession.rs",
+        "        (state.cos_2, state.sin_2) = (cos_2, sin_2);\n",
+        "        if along <= T::two() {\n            (state.cos_2, state.sin_2) = (cos_2, sin_2);\n        }\n",
+        PRECESSION,
+    ),
+    fault(
+        "a pattern on an axis has no direction",
+        "estimator/src/precession.rs",
+        "self.cos_2 != T::zero() || self.sin_2 != T::zero()",
+        "self.cos_2 != T::zero() && self.sin_2 != T::zero()",
+        PRECESSION,
+    ),
+    fault(
+        "an effect without a name is one without effect in C",
+        "capi/src/lib.rs",
+        "        if effect.id.is_null() {\n            return Err(refused(\"named\"));\n        }",
+        "        if effect.id.is_null() {\n            continue;\n        }",
+        C,
+    ),
+    fault(
+        "a count without effects is refused in C",
+        "capi/src/lib.rs",
+        "if effects.is_null() || count == 0 {",
+        "if count == 0 {",
+        C,
     ),
 ];
