@@ -106,6 +106,23 @@ fn compare<T: Float>(which: usize, script: &[Event]) -> Vec<Mode> {
     modes
 }
 
+/// Times that no script is long enough for are in what the parts are made of.
+fn is_made_of_its_parts<T: Float>() {
+    for which in 0..4 {
+        let settings = settings(which);
+        let instrument = format!("{:?}", Instrument::<T>::new(&settings).expect("inside its domain"));
+        for part in Parts::<T>::of(&settings).shown() {
+            assert!(instrument.contains(&part), "{part} is not in {instrument}");
+        }
+    }
+}
+
+#[test]
+fn every_part_is_made_of_the_settings() {
+    is_made_of_its_parts::<f32>();
+    is_made_of_its_parts::<f64>();
+}
+
 fn all_settings<T: Float>(script: &[Event]) -> Vec<Vec<Mode>> {
     (0..4).map(|which| compare::<T>(which, script)).collect()
 }

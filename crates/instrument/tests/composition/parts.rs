@@ -119,6 +119,24 @@ impl<T: Float> Parts<T> {
         }
     }
 
+    /// The parts with all that they were made of, as an instrument shows its own.
+    pub(super) fn shown(&self) -> [String; 12] {
+        [
+            format!("oscillator: {:?}", self.oscillator),
+            format!("demodulator: {:?}", self.demodulator),
+            format!("phase: {:?}", self.phase),
+            format!("precession: {:?}", self.precession),
+            format!("readout: {:?}", self.readout),
+            format!("energy: {:?}", self.energy),
+            format!("quadrature: {:?}", self.quadrature),
+            format!("rate: {:?}", self.rate),
+            format!("allocation: {:?}", self.allocation),
+            format!("supervisor: {:?}", self.supervisor),
+            format!("hold: {:?}", self.heading),
+            format!("most_unseen: {}", self.most_unseen),
+        ]
+    }
+
     /// A sample: what is measured until now acts from the next window on.
     pub(super) fn step(&self, s: &mut State<T>, x: T, y: T) -> (T, T, Status) {
         let now = s.phasor;

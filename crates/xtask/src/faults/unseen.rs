@@ -15,6 +15,8 @@ const C: (&str, &str) = ("cvg-capi", "same_as_rust");
 const LEARNING: (&str, &str) = ("cvg-capi", "calibrator_same_as_rust");
 
 pub(super) const FAULTS: &[Fault] = &[
+    fault("a spin-up has a second more", "instrument/src/settings.rs", "spin_up_s: 5.0,", "spin_up_s: 6.0,", JOINED),
+    fault("a device is given up a start earlier", "instrument/src/settings.rs", "retries: 3,", "retries: 2,", JOINED),
     fault(
         "an angle exactly at the negative end of its period is not known",
         "estimator/src/angle.rs",
