@@ -170,6 +170,8 @@ fn pole_pairs_off_centre_show_once_a_turn_of_the_shaft() {
         let i = poles(3.0, 0.5, 0.0);
         assert!(held_out(&i) < 1.05 * 0.1, "{}° left of 0.1° noise: {:#?}", held_out(&i), i.report.effects);
         assert_eq!(lines(&i), [1.0], "seed {seed}");
+        let said = i.report.unexplained.iter().find(|u| u.class == "table-harmonic").unwrap();
+        assert!(said.suggestion.contains("eccentric"), "{said:?}");
         // slow noise is none, and within one turn it could be a drift
         assert!(lines(&poles(3.0, 0.0, 0.98)).is_empty() && lines(&poles(1.2, 0.5, 0.0)).is_empty(), "seed {seed}");
     }

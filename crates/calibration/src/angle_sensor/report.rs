@@ -155,7 +155,7 @@ pub(crate) fn report(
         angular_gain: finding.angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
-        unexplained: described(&effects),
+        unexplained: described(&effects, finding.hypothesis.angular_gain.abs()),
         effects,
         heldout: Heldout {
             raw: raw.as_ref().map(Evaluation::size),
@@ -265,8 +265,8 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
     }
 }
 
-/// What was corrected without a known cause.
-fn described(effects: &[EffectReport]) -> Vec<Unexplained> {
+/// What was corrected without a known cause, of a sensor with so many periods a turn.
+fn described(effects: &[EffectReport], periods: f64) -> Vec<Unexplained> {
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
@@ -297,12 +297,16 @@ fn described(effects: &[EffectReport]) -> Vec<Unexplained> {
                     }
                 }
             }
-            "table-harmonic" => add(
-                "table-harmonic",
-                Some(value(e, "n") as u32),
-                value(e, "amplitude"),
-                "corrected as a line of the reference's turn on these data; it is not carried into the calibration",
-            ),
+            "table-harmonic" => {
+                let n = value(e, "n");
+                let whose = if n < periods {
+                    "corrected as a line of the shaft's turn on these data, as an eccentric sensor makes; it is not carried into the \
+                     calibration, because the poles do not tell where in its turn the shaft is"
+                } else {
+                    "corrected as a line of the reference's turn on these data; it is not carried into the calibration"
+                };
+                add("table-harmonic", Some(n as u32), value(e, "amplitude"), whose);
+            }
             "harmonic-n" => add(
                 "rate-dependent",
                 Some(0),

@@ -74,15 +74,17 @@ pub(super) fn times(before: f64, after: f64) -> String {
 }
 
 /// The part of the raw error that belongs to the reference and not to the device, rms, deg: it was taken out, and that makes no
-/// instrument better.
+/// instrument better. A line slower than the period of many pole pairs may be the eccentricity of the sensor, and is not counted.
 pub(super) fn of_the_table(r: &Report) -> f64 {
     let of = |e: &EffectReport| {
         let amplitude = e.parameters.iter().find(|p| p.name == "amplitude");
         let line = amplitude.map(|p| (p.value / std::f64::consts::SQRT_2).to_degrees().powi(2));
         line.or(e.heldout_rms_deg.map(|b| (b.before * b.before - b.after * b.after).max(0.0))).unwrap_or(0.0)
     };
+    let order = |e: &EffectReport| e.parameters.iter().find(|p| p.name == "n").map_or(f64::INFINITY, |p| p.value);
+    let sensor = r.instrument == "sensor";
     let table = r.effects.iter().filter(|e| e.id == EffectId::TableHarmonic.description().id);
-    table.map(of).sum::<f64>().sqrt()
+    table.filter(|e| !sensor || order(e) >= r.angular_gain.value.abs()).map(of).sum::<f64>().sqrt()
 }
 
 /// The raw error without what belongs to the table.
