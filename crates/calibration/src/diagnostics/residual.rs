@@ -252,8 +252,8 @@ pub(crate) fn drift_power(evaluation: &Evaluation) -> f64 {
 /// (Marquardt 1970: ten).
 const LARGEST_VARIANCE_INFLATION: f64 = 10.0;
 
-/// Amplitudes of harmonics 1 to `most`, or as many as the angles tell apart, fitted together, with 95 % intervals that allow for `inflation` of the variance
-/// by autocorrelation.
+/// Amplitudes of harmonics 1 to `most`, or as many as the angles tell apart, fitted together, with 95 % intervals that
+/// allow for `inflation` of the variance by autocorrelation.
 pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflation: f64) -> Vec<Harmonic> {
     let n = 2 * most as usize;
     if n == 0 {

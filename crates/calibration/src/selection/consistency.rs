@@ -126,13 +126,15 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
     Ok(())
 }
 
-/// A step with the rival that took its place.
+/// A step with the one rival that took its place as the cause.
 pub(super) fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step {
     let after = on_heldout(dataset, fit);
     let rms = after.mean_square().sqrt().to_degrees();
     let balance = balance(dataset, fit).map(f64::sqrt);
     Step {
         id,
+        origin: Origin::Discovered,
+        confounded_with: Vec::new(),
         gain: step.rivals.iter().find(|r| r.0 == id).map_or(step.gain, |r| r.1),
         rivals: step.rivals.iter().filter(|r| r.0 != id).copied().collect(),
         heldout_rms_deg: [step.heldout_rms_deg[0], rms],

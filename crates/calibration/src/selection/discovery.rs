@@ -74,7 +74,7 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
             && let Some((id, next)) = rival_that_explains(dataset, fitted, at, &steps[own], explains_as_well)?
         {
             *fitted = next;
-            steps[own] = Step { origin: Origin::Discovered, ..in_its_place(dataset, &fitted.fit, id, &steps[own]) };
+            steps[own] = in_its_place(dataset, &fitted.fit, id, &steps[own]);
             restore(dataset, fitted)?;
             continue;
         }

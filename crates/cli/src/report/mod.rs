@@ -139,8 +139,8 @@ fn stages(h: &mut String, identified: &Identification) {
         let _ = write!(h, "<div class=\"stage {class}\"><b>{value}</b><span>{what}</span></div>");
     };
     card("raw", held.raw.map(|e| e.rms_deg), "raw, as recorded");
-    let sensor = identified.report.instrument == "sensor" || tables::is_rate_gyroscope(identified);
-    let declared = if sensor { "after the declared effects" } else { "after the paper's model" };
+    let declared =
+        if tables::has_pattern(identified) { "after the paper's model" } else { "after the declared effects" };
     card("declared", Some(held.declared.rms_deg), declared);
     card("discovered", Some(held.discovered.rms_deg), "after all that was found");
     card("floor", Some(held.noise_floor_deg), "noise of the recording");

@@ -30,7 +30,7 @@ pub(crate) fn name_of_angle(identified: &Identification) -> &'static str {
     if has_pattern(identified) { "pattern angle" } else { "angle" }
 }
 
-fn has_pattern(identified: &Identification) -> bool {
+pub(super) fn has_pattern(identified: &Identification) -> bool {
     identified.report.instrument == "gyroscope" && !is_rate_gyroscope(identified)
 }
 
