@@ -22,10 +22,11 @@ use crate::{Failure, compare, fleet, inspect, library, report};
 /// Columns of a recording by their names.
 pub type Columns = Vec<(String, Values)>;
 
-/// Prepares a process: no more threads than the machine has processors, and a damaged file is an error, not a message of a
-/// decoder. Once is enough.
+/// Prepares a process, the first time: no more threads than the machine has processors, and a damaged file is an error, not a
+/// message of a decoder. RAYON_NUM_THREADS is read then.
 pub fn prepare() {
-    crate::keep_to_the_machine();
+    static PREPARED: std::sync::Once = std::sync::Once::new();
+    PREPARED.call_once(crate::keep_to_the_machine);
 }
 
 /// What is said of a campaign beside its recordings.

@@ -33,7 +33,6 @@ mod _cvg {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        cvg_cli::service::prepare();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -23,7 +23,8 @@ enum Said<T> {
 /// Why the worker stopped without an answer.
 struct Interrupted;
 
-/// Does `work` on a thread of its own. It is given a function to say what it is doing, and ends there where it is no longer
+/// Does `work` on a thread of its own. The process is prepared with the first work and not with the import: a worker of Dask
+/// imports what its client did, and only then hears how many threads it may have. `work` is given a function to say what it is doing, and ends there where it is no longer
 /// wanted: a signal's exception comes back within [`PATIENCE`], the thread at its next word.
 pub(crate) fn aside<T: Send + 'static>(
     py: Python<'_>,
@@ -34,6 +35,7 @@ pub(crate) fn aside<T: Send + 'static>(
     let unwanted = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&unwanted);
     let thread = std::thread::Builder::new().name("cvg".into()).stack_size(STACK_BYTES).spawn(move || {
+        cvg_cli::service::prepare();
         let words = say.clone();
         let progress = move |what: &str| {
             if seen.load(Ordering::Relaxed) {

@@ -6,6 +6,8 @@ import os
 import pickle
 import re
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -170,3 +172,22 @@ def test_the_instrument_steps_over_arrays_and_goes_on_where_it_was():
 
 def test_a_calibration_travels_between_processes(report):
     assert pickle.loads(pickle.dumps(report.calibration)).to_text() == report.calibration.to_text()
+
+
+def test_threads_are_counted_at_the_first_answer_and_not_at_the_import(folder):
+    # a worker of Dask imports what its client did before it hears how many threads it may have
+    said = """
+import os, sys
+import cvg
+os.environ["RAYON_NUM_THREADS"] = sys.argv[2]
+cvg.identify(sys.argv[1])
+print(len(os.listdir("/proc/self/task")))
+"""
+    campaign = str(folder / "campaign.toml")
+    environment = {name: value for name, value in os.environ.items() if name != "RAYON_NUM_THREADS"}
+    threads = [
+        int(subprocess.run([sys.executable, "-c", said, campaign, number], env=environment, capture_output=True, check=True).stdout)
+        for number in ("1", "2")
+    ]
+    processors = len(os.sched_getaffinity(0))
+    assert threads[1] - threads[0] == min(2, processors) - 1
