@@ -15,17 +15,15 @@ use crate::estimation::simplex::least;
 const USUAL: ColouredNoise = ColouredNoise { walk: 1.5e-8, table: 2e-9, gains: 1.5e-8 };
 /// Below these there is none: a walk of 1e-9 rad in a second, and relative wanderings of 1e-7 and 3e-7, are beyond
 /// what any converter shows.
-const LEAST: ColouredNoise = ColouredNoise { walk: 1e-18, table: 1e-14, gains: 1e-13 };
-/// How far above the least, in ln, a strength counts, so that the search ends on either side of it.
-const CLEAR: f64 = 0.5;
-/// How much a search pulls back from below the least, per square of ln: it is flat there.
-const PULL: f64 = 1e-3;
-/// Steps in ln of a search, of a kind that is there and of one that is not yet.
+const LEAST: [f64; KINDS] = [1e-18, 1e-14, 1e-13];
+/// The walk, the table and the gains.
+const KINDS: usize = 3;
+/// Steps in ln of a search.
 const STEP: f64 = 2.0;
-const FIRST_STEP: f64 = 6.0;
-/// Shares of a usual strength at which a search may begin: one that begins far too strong ends in a neighbour's valley.
-const STARTING_SHARES: [f64; 3] = [0.01, 0.1, 1.0];
-/// A search ends where ln likelihood (× 2) and strengths (ln) change by less: a tenth of what tells strengths apart.
+/// Shares of a usual strength at which a kind is tried: a search that begins far too strong ends in a neighbour's valley.
+const STARTING_SHARES: [f64; 5] = [1e-4, 1e-3, 0.01, 0.1, 1.0];
+/// A search ends where ln likelihood (× 2) and strengths (ln) change by less, and a kind that brings less is not there: a tenth
+/// of what tells strengths apart.
 const NEAR: f64 = 0.1;
 
 /// Samples of one segment, averaged and thinned to as many as tell how strong its noise is.
@@ -114,28 +112,45 @@ fn misfit(segments: &[Sampled], noise: &ColouredNoise, believed: &Normal) -> f64
     normal.restricted_misfit().map_or(f64::INFINITY, |m| m + parts.iter().map(|p| p.ln_variance).sum::<f64>())
 }
 
-/// The most likely strengths of noise in all segments together.
+/// The most likely strengths of noise in all segments together. Kinds come in one at a time, the likeliest first, and all that are
+/// there are searched together each time: a kind that is not there costs the filter nothing.
 pub(crate) fn strengths(segments: &[Sampled], believed: &Normal) -> ColouredNoise {
-    let [floor, usual] = [LEAST, USUAL].map(|n| [n.walk, n.table, n.gains].map(f64::ln));
-    let strength = |x: &[f64; 3]| {
-        let [walk, table, gains] = std::array::from_fn(|i| if x[i] > floor[i] + CLEAR { x[i].exp() } else { 0.0 });
-        ColouredNoise { walk, table, gains }
-    };
-    let of = |x: &[f64; 3]| {
-        let below: f64 = x.iter().zip(floor).map(|(x, floor)| (x - floor).min(0.0).powi(2)).sum();
-        misfit(segments, &strength(x), believed) + PULL * below
-    };
-    let mut begin = (floor, of(&floor));
-    for (i, share) in (0..3).flat_map(|i| STARTING_SHARES.map(|share| (i, share))) {
-        let mut x = floor;
-        x[i] = usual[i] + share.ln();
-        let m = of(&x);
-        if m < begin.1 {
-            begin = (x, m);
-        }
+    let of = |x: &[Option<f64>; KINDS]| misfit(segments, &noise(x), believed);
+    let mut best = ([None; KINDS], of(&[None; KINDS]));
+    while let Some(first) = likeliest_addition(&best, &of) {
+        let there: Vec<usize> = (0..KINDS).filter(|&kind| first[kind].is_some()).collect();
+        let with = |x: &[f64]| {
+            let mut all = [None; KINDS];
+            there.iter().zip(x).for_each(|(&kind, x)| all[kind] = Some(*x));
+            all
+        };
+        let begin: Vec<f64> = first.iter().copied().flatten().collect();
+        let (x, misfit) = least(&begin, STEP, NEAR, &|x| of(&with(x)));
+        best = (with(&x), misfit);
     }
-    let steps = std::array::from_fn(|i| if begin.0[i] > floor[i] { STEP } else { FIRST_STEP });
-    strength(&least(begin.0, steps, NEAR, &of).0)
+    noise(&best.0)
+}
+
+/// Strengths from their logarithms; what is not there, or too little to be, is 0.
+fn noise(ln: &[Option<f64>; KINDS]) -> ColouredNoise {
+    let [walk, table, gains] =
+        std::array::from_fn(|kind| ln[kind].map(f64::exp).filter(|s| *s > LEAST[kind]).unwrap_or(0.0));
+    ColouredNoise { walk, table, gains }
+}
+
+/// The strengths at hand with the one kind more that brings most, where any brings enough.
+fn likeliest_addition(
+    (present, misfit): &([Option<f64>; KINDS], f64),
+    of: &dyn Fn(&[Option<f64>; KINDS]) -> f64,
+) -> Option<[Option<f64>; KINDS]> {
+    let usual = [USUAL.walk, USUAL.table, USUAL.gains];
+    let absent = (0..KINDS).filter(|&kind| present[kind].is_none());
+    let tries = absent.flat_map(|kind| STARTING_SHARES.map(|share| (kind, share))).map(|(kind, share)| {
+        let mut x = *present;
+        x[kind] = Some((usual[kind] * share).ln());
+        (of(&x), x)
+    });
+    tries.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(m, _)| *m < misfit - NEAR).map(|(_, x)| x)
 }
 
 #[cfg(test)]
