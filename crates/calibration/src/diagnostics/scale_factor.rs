@@ -36,9 +36,12 @@ const SPIKE: f64 = 6.0;
 /// Unknowns of a run: the gain's deviation, second and fourth harmonic of the angle, which a run leaves off in the middle.
 const UNKNOWNS: usize = 5;
 
-/// Rate, deg/s, and angular gain of each run. Every run drifts by itself in a fit of its own: a gain that goes with the rate
+/// Rate, deg/s, and angular gain of each run, where their rates are such as tell a scale factor. Every run drifts by itself in a fit of its own: a gain that goes with the rate
 /// would else be taken for what the drive does.
 pub(crate) fn gains(dataset: &mut Dataset, fitted: &Fitted) -> Vec<(f64, Estimate)> {
+    if range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees())).is_none() {
+        return Vec::new();
+    }
     let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
     let balance = dataset.energy_balance;
     let drifted: Vec<bool> = dataset.tracks.iter().map(|t| t.drifts).collect();
@@ -108,13 +111,8 @@ fn slope(segments: &[Residual]) -> Option<(f64, f64)> {
 pub(crate) fn scale_factor(gains: &[(f64, Estimate)]) -> Option<ScaleFactor> {
     let told: Vec<(f64, Estimate)> =
         gains.iter().copied().filter(|(rate, gain)| rate.abs() > 0.0 && gain.half_width() > 0.0).collect();
-    let fastest = told.iter().map(|(rate, _)| rate.abs()).fold(0.0, f64::max);
-    let slowest = told.iter().map(|(rate, _)| rate.abs()).fold(f64::INFINITY, f64::min);
-    let both = told.iter().any(|t| t.0 > 0.0) && told.iter().any(|t| t.0 < 0.0);
+    let [slowest, fastest] = range_of_rates(told.iter().map(|t| t.0))?;
     let range = 1.0 - slowest / fastest;
-    if distinct(&told, fastest) < FEWEST_RATES || !both || range < SAME_RATE {
-        return None;
-    }
     let mean = told.iter().map(|t| t.1.value).sum::<f64>() / told.len() as f64;
     let prior = [VAGUE, VAGUE, VAGUE, BIAS_DPS].map(|s| (s * mean).powi(-2));
     let mut information = Matrix4::from_diagonal(&Vector4::from(prior));
@@ -141,12 +139,15 @@ pub(crate) fn scale_factor(gains: &[(f64, Estimate)]) -> Option<ScaleFactor> {
     Some(ScaleFactor { nonlinearity_ppm: estimate(1, range), asymmetry_ppm: estimate(2, 2.0) })
 }
 
-/// Rates with their signs that are not one.
-fn distinct(told: &[(f64, Estimate)], fastest: f64) -> usize {
-    let mut rates: Vec<f64> = told.iter().map(|t| t.0).collect();
+/// The slowest and the fastest rate, where there are three or more, in both senses, that are not one.
+fn range_of_rates(rates: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let mut rates: Vec<f64> = rates.filter(|rate| rate.abs() > 0.0).collect();
     rates.sort_by(f64::total_cmp);
+    let both = rates.first()? * rates.last()? < 0.0;
+    let fastest = rates.iter().map(|r| r.abs()).fold(0.0, f64::max);
+    let slowest = rates.iter().map(|r| r.abs()).fold(f64::INFINITY, f64::min);
     rates.dedup_by(|a, b| (*a - *b).abs() < SAME_RATE * fastest);
-    rates.len()
+    (rates.len() >= FEWEST_RATES && both && 1.0 - slowest / fastest >= SAME_RATE).then_some([slowest, fastest])
 }
 
 #[cfg(test)]

@@ -136,6 +136,7 @@ pub(crate) fn fit(
             let samples = p.track.samples(role);
             if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, samples, effort.thinned) }
         };
+        let every_sample = tracks.iter().all(|p| stride(p) == p.track.stride);
         let sums: Vec<Vec<Sums>> = tracks
             .par_iter()
             .zip(&result.starts)
@@ -184,7 +185,7 @@ pub(crate) fn fit(
             break;
         }
         if (small && damping == 0.0) || step_number + 1 >= effort.steps {
-            if !effort.polish {
+            if !effort.polish || (small && every_sample) {
                 break;
             }
             // the last step looks at all samples, and must not be compared with those that did not
