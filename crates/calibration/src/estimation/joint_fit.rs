@@ -1,6 +1,6 @@
 //! From a campaign to an identified instrument: prepare, fit what is declared, and what the residual asks for.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Stage};
+use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::data::track::Track;
@@ -18,18 +18,10 @@ use crate::recording::{Campaign, Instrument, Role, RunKind};
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
 pub mod belief {
-    /// Δ(1/τ) along either axis, 1/s: four times the paper's device
-    pub const ANISODAMPING_PER_S: f64 = 0.02;
-    /// Δω along either axis, rad/s: a split of 1 Hz
-    pub const ANISOELASTICITY_RAD_S: f64 = 6.3;
-    /// ln(G_Ax/G_Ay)
-    pub const ACTUATION_RATIO: f64 = 0.15;
     /// 1/τ, 1/s, where commands and ring-downs are missing: time constants of 8 s and more
     pub const DAMPING_PER_S: f64 = 0.06;
     /// control latency, s
     pub const CONTROL_LATENCY_S: f64 = 2e-3;
-    /// what the drives feed through to the readout, as a share of the amplitude
-    pub const FEEDTHROUGH: f64 = 0.02;
     /// the energy command cannot change the amplitude faster than this, 1/s
     pub const FORCING_PER_S: f64 = 3.0;
 }
@@ -188,6 +180,20 @@ impl Dataset {
         median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
     }
 
+    /// rms of the commands over the amplitude, V/V.
+    fn commanded(&self) -> f64 {
+        self.command_rms[0].hypot(self.command_rms[1]).max(1e-9)
+    }
+
+    /// How far a parameter may be from its neutral value before the data, as a standard deviation.
+    pub(crate) fn believed(&self, parameter: &Parameter) -> Option<f64> {
+        match parameter.belief {
+            Belief::Vague => None,
+            Belief::Within(deviation) => Some(deviation),
+            Belief::ShareOfAmplitude(share) => Some(share / self.commanded()),
+        }
+    }
+
     /// Priors for the unknowns that the data may be silent about.
     pub(crate) fn priors(&self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Vec<Prior> {
         let prior = |unknown, mean, deviation| Prior { unknown, mean, deviation, considered: false };
@@ -196,25 +202,27 @@ impl Dataset {
             Prior { considered, ..prior(Unknown::ControlLatency, 0.0, belief::CONTROL_LATENCY_S) },
             Prior { considered: true, ..prior(Unknown::Damping, belief::DAMPING_PER_S, belief::DAMPING_PER_S) },
         ];
-        let mut effect = |id, p, mean, deviation| {
-            if let Some(member) = hypothesis.position(id) {
-                all.push(prior(Unknown::Effect(member, p), mean, deviation));
+        for (i, member) in hypothesis.members.iter().enumerate() {
+            for (p, parameter) in member.id.description().parameters.iter().enumerate() {
+                if let Some(deviation) = self.believed(parameter) {
+                    all.push(prior(Unknown::Effect(i, p), parameter.neutral, deviation));
+                }
+            }
+        }
+        // what was measured takes the place of what is believed
+        let mut measured = |id, p, mean, deviation| {
+            let unknown = hypothesis.position(id).map(|member| Unknown::Effect(member, p));
+            for prior in all.iter_mut().filter(|prior| Some(prior.unknown) == unknown) {
+                (prior.mean, prior.deviation) = (mean, deviation);
             }
         };
-        for p in 0..2 {
-            effect(EffectId::Anisodamping, p, 0.0, belief::ANISODAMPING_PER_S);
-            let (mean, deviation) = self
-                .quadrature_balance
-                .map_or((0.0, belief::ANISOELASTICITY_RAD_S), |(w, deviation)| (w[p], deviation));
-            effect(EffectId::Anisoelasticity, p, mean, deviation);
+        if let Some((split, deviation)) = self.quadrature_balance {
+            (0..2).for_each(|p| measured(EffectId::Anisoelasticity, p, split[p], deviation));
         }
-        let commanded = self.command_rms[0].hypot(self.command_rms[1]).max(1e-9);
-        for p in 0..EffectId::DriveFeedthrough.description().parameters.len() {
-            effect(EffectId::DriveFeedthrough, p, 0.0, belief::FEEDTHROUGH / commanded);
+        if let Some(d) = drive {
+            measured(EffectId::ActuationGainMismatch, 0, d.ratio(), d.ratio() * d.ratio_error.max(1e-6));
         }
-        let ratio = drive.map_or((1.0, belief::ACTUATION_RATIO), |d| (d.ratio(), d.ratio() * d.ratio_error.max(1e-6)));
-        effect(EffectId::ActuationGainMismatch, 0, ratio.0, ratio.1);
-        let silent = (0.0, belief::FORCING_PER_S / commanded);
+        let silent = (0.0, belief::FORCING_PER_S / self.commanded());
         let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };
         let balance = self.energy_balance.map(|(scale, deviation)| (scale, deviation.max(share * scale)));
         let scale = drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(balance).unwrap_or(silent);

@@ -1,12 +1,12 @@
 //! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
 //! the campaign tells it.
 
-use cvg_model::effects::{EffectId, Role as ParameterRole, Shown, Stage};
+use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::estimation::identifiability::{confounded_with, separated_by};
-use crate::estimation::joint_fit::{Dataset, Fitted, belief};
+use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
@@ -107,7 +107,7 @@ impl Inference<'_> {
         }
         let unknown = self.first(EffectId::ActuationGainMismatch);
         let told = unknown
-            .filter(|u| self.deviation(*u) < MIN_CONTRACTION * belief::ACTUATION_RATIO)
+            .filter(|u| self.told(*u, &EffectId::ActuationGainMismatch.description().parameters[0]))
             .map(|u| self.estimate(u))
             .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
             .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
@@ -133,19 +133,19 @@ impl Inference<'_> {
         told
     }
 
-    /// A member's deviations are well below what was believed without data.
+    /// The deviation of a parameter is well below what was believed of it without data.
+    fn told(&self, unknown: Unknown, parameter: &Parameter) -> bool {
+        self.dataset.believed(parameter).is_none_or(|believed| self.deviation(unknown) < MIN_CONTRACTION * believed)
+    }
+
+    /// All that was fitted of a member is told.
     pub(crate) fn identifiable(&self, at: usize, member: &Member) -> bool {
-        let scale = match member.id {
-            EffectId::Anisodamping => belief::ANISODAMPING_PER_S,
-            EffectId::Anisoelasticity => belief::ANISOELASTICITY_RAD_S,
-            EffectId::ActuationGainMismatch => belief::ACTUATION_RATIO,
-            _ => f64::INFINITY,
-        };
-        let fitted = (0..member.id.description().parameters.len())
-            .map(|p| Unknown::Effect(at, p))
-            .filter(|u| self.index(*u).is_some())
-            .collect::<Vec<_>>();
-        !fitted.is_empty() && fitted.iter().all(|u| self.deviation(*u) < MIN_CONTRACTION * scale)
+        let parameters = member.id.description().parameters.iter().enumerate();
+        let fitted: Vec<(Unknown, &Parameter)> = parameters
+            .map(|(p, parameter)| (Unknown::Effect(at, p), parameter))
+            .filter(|(u, _)| self.index(*u).is_some())
+            .collect();
+        !fitted.is_empty() && fitted.iter().all(|(u, parameter)| self.told(*u, parameter))
     }
 
     /// Every effect that the campaign tells, in the words of the report.

@@ -1,6 +1,6 @@
 //! Unequal drive gains, G_Ax/G_Ay (Equations 9 and 10), kept at a common mean: G_Ax ∝ √ratio, G_Ay ∝ 1/√ratio.
 
-use super::{Description, Effect, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Belief, Description, Effect, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{AxisForces, Real};
 
 /// unequal actuation gains.
@@ -22,6 +22,7 @@ impl Effect for ActuationGainMismatch {
             neutral: 1.0,
             scale: 1e-2,
             role: Role::Fitted,
+            belief: Belief::Within(0.15),
         }],
         onsets: &[],
         shown: &[Shown::Plain(0)],

@@ -1,7 +1,10 @@
 //! Damping that differs between two principal axes: Δ(1/τ) at θ_τ, resolved into (Δ cos 2θ_τ, Δ sin 2θ_τ).
 
-use super::{Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::{Belief, Description, Effect, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
+
+/// Four times the difference that the paper's device has, 1/s.
+const FOUR_TIMES_THE_PAPERS: Belief = Belief::Within(0.02);
 
 /// damping that depends on direction.
 pub struct Anisodamping;
@@ -14,7 +17,10 @@ impl Effect for Anisodamping {
         declared: true,
         empirical: false,
         in_sensors: false,
-        parameters: &[fitted("anisodamping_cos2", "1/s", 10.0, 1e-3), fitted("anisodamping_sin2", "1/s", 10.0, 1e-3)],
+        parameters: &[
+            fitted("anisodamping_cos2", "1/s", 10.0, 1e-3).believed(FOUR_TIMES_THE_PAPERS),
+            fitted("anisodamping_sin2", "1/s", 10.0, 1e-3).believed(FOUR_TIMES_THE_PAPERS),
+        ],
         onsets: &[],
         shown: &[Shown::Polar {
             cos: 0,

@@ -1,7 +1,10 @@
 //! Stiffness that differs between two principal axes: Δω at θ_ω, resolved into (Δω cos 2θ_ω, Δω sin 2θ_ω).
 
-use super::{Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::{Belief, Description, Effect, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
+
+/// A split of 1 Hz, in rad/s.
+const ONE_HERTZ: Belief = Belief::Within(6.3);
 
 /// stiffness that depends on direction.
 pub struct Anisoelasticity;
@@ -15,8 +18,8 @@ impl Effect for Anisoelasticity {
         empirical: false,
         in_sensors: false,
         parameters: &[
-            fitted("anisoelasticity_cos2", "rad/s", 1e3, 1e-2),
-            fitted("anisoelasticity_sin2", "rad/s", 1e3, 1e-2),
+            fitted("anisoelasticity_cos2", "rad/s", 1e3, 1e-2).believed(ONE_HERTZ),
+            fitted("anisoelasticity_sin2", "rad/s", 1e3, 1e-2).believed(ONE_HERTZ),
         ],
         onsets: &[],
         shown: &[Shown::Polar {

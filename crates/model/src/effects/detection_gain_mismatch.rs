@@ -1,6 +1,6 @@
 //! Unequal readout gains: y_d = g·y with g = G_Dy/G_Dx (Equations 5 to 7).
 
-use super::{Description, Effect, Inverse, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Belief, Description, Effect, Inverse, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{DetectionGains, Envelope, Real};
 
 /// unequal detection gains.
@@ -22,6 +22,7 @@ impl Effect for DetectionGainMismatch {
             neutral: 1.0,
             scale: 1e-3,
             role: Role::Fitted,
+            belief: Belief::Vague,
         }],
         onsets: &[],
         shown: &[Shown::Plain(0)],

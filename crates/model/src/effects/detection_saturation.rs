@@ -3,7 +3,7 @@
 //!
 //! The parameter is 1/clip, so that 0 is "never".
 
-use super::{Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Belief, Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{Envelope, Real};
 
 /// clipping of the readout carrier.
@@ -25,6 +25,7 @@ impl Effect for DetectionSaturation {
             neutral: 0.0,
             scale: 1e-3,
             role: Role::Fitted,
+            belief: Belief::Vague,
         }],
         onsets: &[1.01, 1.05, 1.2],
         shown: &[Shown::Plain(0)],

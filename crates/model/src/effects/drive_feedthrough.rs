@@ -5,8 +5,11 @@
 //! is a mismatch of their gains: v_as (c″_y − c″_x)/a. The quadrature command goes as sin 2(θ − θ_ω) where the plates are
 //! split, and adds c' v_qc/a to the angle and c″ v_qc to the quadrature that the loop then nulls by a true one.
 
-use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
+use super::{Belief, Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
+
+/// What the drives feed through, in all.
+const A_FIFTIETH: Belief = Belief::ShareOfAmplitude(0.02);
 
 /// feed-through of the drive into the pick-off.
 pub struct DriveFeedthrough;
@@ -22,10 +25,10 @@ impl Effect for DriveFeedthrough {
         empirical: false,
         in_sensors: false,
         parameters: &[
-            fitted("x_in_phase", "V/V", 1.0, 1e-3),
-            fitted("x_quadrature", "V/V", 1.0, 1e-3),
-            fitted("y_in_phase", "V/V", 1.0, 1e-3),
-            fitted("y_quadrature", "V/V", 1.0, 1e-3),
+            fitted("x_in_phase", "V/V", 1.0, 1e-3).believed(A_FIFTIETH),
+            fitted("x_quadrature", "V/V", 1.0, 1e-3).believed(A_FIFTIETH),
+            fitted("y_in_phase", "V/V", 1.0, 1e-3).believed(A_FIFTIETH),
+            fitted("y_quadrature", "V/V", 1.0, 1e-3).believed(A_FIFTIETH),
         ],
         onsets: &[],
         shown: &[Shown::Plain(0), Shown::Plain(1), Shown::Plain(2), Shown::Plain(3)],

@@ -4,7 +4,9 @@
 //! How it scales with the precession rate Ω_p is one of four: f = 1, its sign, Ω_p itself, or 1/Ω_p (Ω_p in rad/s). With
 //! n = 0 and the sign it is a step between the directions, as backlash makes.
 
-use super::{Description, Effect, Moment, Parameter, Role, Scaling, Search, Shown, Stage, Values, fitted, searched};
+use super::{
+    Belief, Description, Effect, Moment, Parameter, Role, Scaling, Search, Shown, Stage, Values, fitted, searched,
+};
 use crate::{Envelope, Real};
 
 /// a harmonic of the pattern angle without a known cause.
@@ -30,6 +32,7 @@ impl Effect for HarmonicN {
                 neutral: scaling::CONSTANT,
                 scale: 1.0,
                 role: Role::Chosen(&[scaling::CONSTANT, scaling::DIRECTION, scaling::RATE, scaling::INVERSE_RATE]),
+                belief: Belief::Vague,
             },
         ],
         onsets: &[],

@@ -105,6 +105,27 @@ pub struct Parameter {
     pub scale: f64,
     /// how a fit treats it
     pub role: Role,
+    /// what is believed of it before the data
+    pub belief: Belief,
+}
+
+impl Parameter {
+    /// The same with a belief.
+    const fn believed(self, belief: Belief) -> Self {
+        Self { belief, ..self }
+    }
+}
+
+/// What is believed of a parameter before the data: how far it may be from its neutral value, as a standard deviation. The
+/// data have to say more than this for the parameter to be reported.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Belief {
+    /// nothing
+    Vague,
+    /// so far, in the parameter's unit
+    Within(f64),
+    /// what it does is within this share of the amplitude: divided by the rms of the commands over the amplitude, V/V
+    ShareOfAmplitude(f64),
 }
 
 /// How a fit treats a parameter.
@@ -306,7 +327,16 @@ const FIXED_POINT_STEPS: usize = 8;
 
 /// A description's default for a fitted parameter.
 const fn fitted(name: &'static str, unit: &'static str, bound: f64, scale: f64) -> Parameter {
-    Parameter { name, unit, lower: -bound, upper: bound, neutral: 0.0, scale, role: Role::Fitted }
+    Parameter {
+        name,
+        unit,
+        lower: -bound,
+        upper: bound,
+        neutral: 0.0,
+        scale,
+        role: Role::Fitted,
+        belief: Belief::Vague,
+    }
 }
 
 /// A parameter that is held until the data asks for it.
@@ -316,7 +346,16 @@ const fn refined(name: &'static str, unit: &'static str, bound: f64, scale: f64)
 
 /// A parameter that a search sets.
 const fn searched(name: &'static str, unit: &'static str, lower: f64, upper: f64, over: Search) -> Parameter {
-    Parameter { name, unit, lower, upper, neutral: lower, scale: 1.0, role: Role::Searched(over) }
+    Parameter {
+        name,
+        unit,
+        lower,
+        upper,
+        neutral: lower,
+        scale: 1.0,
+        role: Role::Searched(over),
+        belief: Belief::Vague,
+    }
 }
 
 /// A parameter that a search starts.

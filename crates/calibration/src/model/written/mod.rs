@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 
 use cvg_model::effects::written::{Step, Target, Variable, Written};
 use cvg_model::effects::{
-    Description, EffectId, MAX_PARAMETERS, Moment, Parameter, Role, Scaling, Shown, Stage, Values,
+    Belief, Description, EffectId, MAX_PARAMETERS, Moment, Parameter, Role, Scaling, Shown, Stage, Values,
 };
 use cvg_model::{AxisForces, Envelope};
 use serde::{Deserialize, Serialize};
@@ -409,7 +409,7 @@ fn description(text: &EffectText, stage: Stage, source: &str) -> Description {
             let [lower, upper] = p.bounds();
             let role = if p.held { Role::Chosen(vec![p.neutral].leak()) } else { Role::Fitted };
             let (name, unit) = (kept(&p.name), kept(&p.unit));
-            Parameter { name, unit, lower, upper, neutral: p.neutral, scale: p.scale, role }
+            Parameter { name, unit, lower, upper, neutral: p.neutral, scale: p.scale, role, belief: Belief::Vague }
         })
         .collect();
     let title = if text.summary.is_empty() { "an effect of the user" } else { kept(&text.summary) };
