@@ -4,6 +4,7 @@
 //! at either end: the bound of the angle all around is one up to half a turn, and says so by its period. Where R is
 //! positive it is a bound between the numbers themselves.
 
+use cvg_estimator::precession::{half_the_angle, twice_the_angle};
 use cvg_model::{Envelope, Orbit, Pendulum, Real};
 use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
 use cvg_tests::domain::{any_vector, octave, unit};
@@ -236,6 +237,21 @@ impl Formula for AngleOfEnvelope {
     }
 }
 
+/// θ of an envelope in phase with the reference as the instrument tells it: by the unit vector that it keeps.
+struct AngleThatIsTold;
+
+impl Formula for AngleThatIsTold {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        let p = Envelope::new(x[0], T::zero(), x[1], T::zero()).pendulum();
+        let (cos_2, sin_2) = twice_the_angle(&p, p.r.norm(p.s));
+        vec![half_the_angle(cos_2, sin_2)]
+    }
+
+    fn period_turns(&self) -> f64 {
+        0.5
+    }
+}
+
 for_each_precision! {
     //= specs/equation-04.md#arctangent-of-the-paper
     //= type=test
@@ -275,5 +291,19 @@ for_each_precision! {
     #[test]
     fn interval_the_angle_of_an_envelope_twin() {
         rejects_rounding::<T>(&AngleOfEnvelope, &any_vector(2), &ANGLE);
+    }
+
+    //= specs/equation-04.md#orientation-of-the-orbit
+    //= type=test
+    //# The angle of an orbit MUST be its orientation up to a multiple of 180°.
+    /// As the instrument tells it: what the unit vector rounds is in it.
+    #[test]
+    fn interval_the_angle_that_is_told() {
+        bounded::<T>(&AngleThatIsTold, &any_vector(2), &ANGLE);
+    }
+
+    #[test]
+    fn interval_the_angle_that_is_told_twin() {
+        rejects_rounding::<T>(&AngleThatIsTold, &any_vector(2), &ANGLE);
     }
 }

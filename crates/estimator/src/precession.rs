@@ -112,8 +112,8 @@ impl<T: Float> Precession<T> {
         if !directed {
             return false;
         }
-        let scale = T::one() / line;
-        self.turn_steadily(state, p.r * scale, p.s * scale)
+        let (cos_2, sin_2) = twice_the_angle(p, line);
+        self.turn_steadily(state, cos_2, sin_2)
     }
 
     /// Follows a direction that has moved steadily. False, and nothing changed, elsewhere.
@@ -142,8 +142,8 @@ impl<T: Float> Precession<T> {
             *state = PrecessionState { half_turns: state.half_turns, ..PrecessionState::default() };
             return Movement::Unknown;
         }
-        let scale = T::one() / line;
-        self.turn_anyhow(state, p.r * scale, p.s * scale)
+        let (cos_2, sin_2) = twice_the_angle(p, line);
+        self.turn_anyhow(state, cos_2, sin_2)
     }
 
     /// Follows a direction, however it has moved.
@@ -187,6 +187,21 @@ impl<T: Float> Precession<T> {
     }
 }
 
+/// The unit vector (cos 2θ, sin 2θ) = (R, S)/`line` of an orbit whose √(R² + S²) is `line` > 0.
+#[inline(always)]
+pub fn twice_the_angle<T: Real>(p: &Pendulum<T>, line: T) -> (T, T) {
+    let scale = T::one() / line;
+    (p.r * scale, p.s * scale)
+}
+
+/// The angle in [−90°, 90°], rad, of (cos 2θ, sin 2θ): **Equation 4** of a unit vector.
+#[inline]
+pub fn half_the_angle<T: Real>(cos_2: T, sin_2: T) -> T {
+    let zero = T::zero();
+    // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
+    Pendulum { e: T::one(), q: zero, r: cos_2, s: sin_2 + zero, l: zero }.angle()
+}
+
 impl<T: Float> PrecessionState<T> {
     /// Cosine and sine of twice the angle from the last direction to the one of (`cos_2`, `sin_2`).
     #[inline(always)]
@@ -208,10 +223,7 @@ impl<T: Float> PrecessionState<T> {
     /// The unwrapped angle as half turns and the angle within (−90°, 90°], rad: **Equation 4** with its jumps counted.
     /// 0 where there is no direction.
     pub fn angle(&self) -> (i32, T) {
-        let zero = T::zero();
-        // −0 + 0 = 0: Equation 4 puts the cut's own points on its positive side
-        let within = Pendulum { e: T::one(), q: zero, r: self.cos_2, s: self.sin_2 + zero, l: zero }.angle();
-        (self.half_turns, within.bounded(T::half() * T::PI))
+        (self.half_turns, half_the_angle(self.cos_2, self.sin_2).bounded(T::half() * T::PI))
     }
 
     //= specs/electronics.md#certified-angle

@@ -2,7 +2,7 @@
 //!
 //! The book's page on the certified angle derives each link and says what it rests on.
 
-use core::f64::consts::{PI, SQRT_2};
+use core::f64::consts::PI;
 
 /// What the bound depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,12 +79,13 @@ impl Chain {
         if along < 1.0 { (0.5 * along.asin()).to_degrees() } else { 90.0 }
     }
 
-    /// Equation 4 in the machine, degrees: the bound that intervals prove, for the eccentricity.
+    /// Equation 4 in the machine by the unit vector that the tracker keeps, degrees: the bound that intervals prove, for the
+    /// eccentricity.
     pub(crate) fn angle_rounding_deg(&self) -> f64 {
         let q2 = self.roundness * self.roundness;
         let proved = if self.epsilon > 1e-10 { 2e-6 } else { 4e-15 };
-        // the unit vector, a component at a time, and the angle in degrees once more
-        ((proved + SQRT_2 * self.epsilon) * (1.0 + q2) / (1.0 - q2)).to_degrees() + 180.0 * f64::EPSILON
+        // and the angle in degrees once more
+        (proved * (1.0 + q2) / (1.0 - q2)).to_degrees() + 180.0 * f64::EPSILON
     }
 
     /// All links: their names and degrees.

@@ -50,8 +50,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the other spelling of zero is the other side of the cut",
         "estimator/src/precession.rs",
-        "s: self.sin_2 + zero, l: zero",
-        "s: self.sin_2, l: zero",
+        "s: sin_2 + zero, l: zero",
+        "s: sin_2, l: zero",
         PRECESSION,
     ),
     fault(

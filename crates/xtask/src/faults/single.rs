@@ -209,8 +209,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision an angle at the cut is on its other side",
         "estimator/src/precession.rs",
-        "s: self.sin_2 + zero, l: zero",
-        "s: if core::mem::size_of::<T>() == 4 { self.sin_2 } else { self.sin_2 + zero }, l: zero",
+        "s: sin_2 + zero, l: zero",
+        "s: if core::mem::size_of::<T>() == 4 { sin_2 } else { sin_2 + zero }, l: zero",
         ESTIMATOR,
     ),
     fault(
