@@ -89,29 +89,29 @@ impl Inference<'_> {
         self.index(unknown).map(|_| unknown)
     }
 
-    /// G_Dy/G_Dx, where the campaign tells it.
+    /// G_Dy/G_Dx, where the campaign identifies it.
     pub(crate) fn detection_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
         let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
-        let told = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
-        if told.is_none() {
+        let identified = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
+        if identified.is_none() {
             warnings.push("the campaign cannot tell the detection gain ratio".into());
         }
-        told
+        identified
     }
 
-    /// G_Ax/G_Ay, where the campaign tells it.
+    /// G_Ax/G_Ay, where the campaign identifies it.
     pub(crate) fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
         if self.dataset.instrument == Instrument::Sensor {
             warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
             return None;
         }
         let unknown = self.first(EffectId::ActuationGainMismatch);
-        let told = unknown
-            .filter(|u| self.told(*u, &EffectId::ActuationGainMismatch.description().parameters[0]))
+        let identified = unknown
+            .filter(|u| self.is_identified(*u, &EffectId::ActuationGainMismatch.description().parameters[0]))
             .map(|u| self.estimate(u))
             .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
             .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
-        match (&told, &self.fitted.drive) {
+        match (&identified, &self.fitted.drive) {
             (None, _) => warnings.push(
                 "the campaign cannot tell the actuation gain ratio: ring-downs at 0° and 90° with vas_v would".into(),
             ),
@@ -130,22 +130,22 @@ impl Inference<'_> {
                 }
             }
         }
-        told
+        identified
     }
 
     /// The deviation of a parameter is well below what was believed of it without data.
-    fn told(&self, unknown: Unknown, parameter: &Parameter) -> bool {
+    fn is_identified(&self, unknown: Unknown, parameter: &Parameter) -> bool {
         self.dataset.believed(parameter).is_none_or(|believed| self.deviation(unknown) < MIN_CONTRACTION * believed)
     }
 
-    /// All that was fitted of a member is told.
+    /// All that was fitted of a member is identified.
     pub(crate) fn identifiable(&self, at: usize, member: &Member) -> bool {
         let parameters = member.id.description().parameters.iter().enumerate();
         let fitted: Vec<(Unknown, &Parameter)> = parameters
             .map(|(p, parameter)| (Unknown::Effect(at, p), parameter))
             .filter(|(u, _)| self.index(*u).is_some())
             .collect();
-        !fitted.is_empty() && fitted.iter().all(|(u, parameter)| self.told(*u, parameter))
+        !fitted.is_empty() && fitted.iter().all(|(u, parameter)| self.is_identified(*u, parameter))
     }
 
     /// Every effect that the campaign tells, in the words of the report.
