@@ -1,7 +1,7 @@
 //! Recordings that are not what they seem: each gets a right answer with the fault named, or none with its reason.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use cvg_calibration::recording::{Campaign, Recording, Role, Run, RunKind};
+use cvg_calibration::recording::{Campaign, Instrument, Recording, Role, Run, RunKind};
 use cvg_calibration::report::Status;
 use cvg_calibration::{Cause, Identification, Options, Refusal, identify};
 use cvg_tests::bench::Draws;
@@ -288,6 +288,111 @@ fn runs_that_do_not_agree_on_the_ratio_of_the_gains_are_named_and_the_interval_c
     let is_said =
         |w: &String| w.contains("do not agree on the detection gain ratio") && w.contains("300dps-3.csv 1.01");
     assert!(report.warnings.iter().any(is_said), "{:?}", report.warnings);
+}
+
+/// What the runs differ in is a damping that differs by axis, or they are of two instruments: nothing tells which.
+#[test]
+fn of_two_runs_with_two_ratios_of_the_gains_the_interval_covers_both() {
+    let mut runs: Vec<Recording> = [[500.0, 1.0], [40.0, 1.017]]
+        .map(|[rate_dps, times]| {
+            let mut run = Made { rate_dps, duration_s: 50.0, seed: rate_dps as u64, ..Made::default() }.recording();
+            run.yc_v.iter_mut().flatten().for_each(|v| *v *= times);
+            run
+        })
+        .to_vec();
+    let told = |runs: &[Recording]| {
+        let report = identified(runs.to_vec()).unwrap().report;
+        let is_said = report.warnings.iter().any(|w| w.contains("told apart by a run that no other bears out"));
+        (report.detection_gain_ratio.unwrap(), is_said)
+    };
+    let (ratio, is_said) = told(&runs);
+    let [low, high] = ratio.ci95;
+    // to the second order in what they differ by
+    assert!(is_said && low < RATIO + 5e-4 && high > 1.017 * RATIO - 5e-4, "{ratio:?}");
+    // a third run at yet another rate bears the first out
+    runs[1].yc_v.iter_mut().flatten().for_each(|v| *v /= 1.017);
+    runs.push(Made { rate_dps: -150.0, seed: 3, ..Made::default() }.recording());
+    let (ratio, is_said) = told(&runs);
+    assert!(!is_said && (ratio.value - RATIO).abs() < 1e-5 && ratio.half_width() < 1e-4, "{ratio:?}");
+}
+
+/// Beside a run that swings, a slow one with another gain would have to drift by more than is believed.
+#[test]
+fn a_drift_that_is_not_believed_widens_the_interval_of_the_angular_gain() {
+    let swings = Made { rate_dps: -265.0, swings: 1.0, angular_gain: 0.782, ..Made::default() };
+    let steady = Made { rate_dps: 89.0, duration_s: 30.0, seed: 2, ..Made::default() };
+    let report = identified(vec![swings.recording(), steady.recording()]).unwrap().report;
+    let [low, high] = report.angular_gain.ci95;
+    assert!(low < ANGULAR_GAIN + 1e-5 && 0.782 < high + 1e-5, "{:?}", report.angular_gain);
+    let is_said = |w: &String| w.contains("do not agree on the angular gain") && w.contains("89dps-2.csv 0.78");
+    assert!(report.warnings.iter().any(is_said), "{:?}", report.warnings);
+}
+
+#[test]
+fn a_recording_that_is_there_twice_counts_once() {
+    let recordings = || [500.0, -200.0].map(|rate_dps| Made { rate_dps, ..Made::default() }.recording()).to_vec();
+    let alone = identified(recordings()).unwrap().report;
+    let twice = identified(recordings().into_iter().chain(recordings()).collect()).unwrap().report;
+    assert_eq!(twice.angular_gain, alone.angular_gain);
+    assert_eq!(twice.runs.iter().filter(|r| r.r#use == "left out").count(), 2, "{:?}", twice.runs);
+    assert!(twice.warnings.iter().any(|w| w.contains("it is the same recording as")), "{:?}", twice.warnings);
+}
+
+#[test]
+fn one_run_of_which_nothing_can_be_made_does_not_refuse_the_others() {
+    let still = |r: &mut Recording| r.rate_dps.iter_mut().flatten().for_each(|v| *v = 0.0);
+    let coarse = |r: &mut Recording| {
+        [&mut r.xc_v, &mut r.yc_v].into_iter().flatten().flatten().for_each(|v| *v = (*v * 2.0).round() / 2.0);
+    };
+    let short = |r: &mut Recording| r.rate_dps.iter_mut().flatten().for_each(|v| *v *= 1e-3);
+    for damage in [still as fn(&mut Recording), coarse, short] {
+        let mut runs: Vec<Recording> = [500.0, -400.0, 200.0]
+            .into_iter()
+            .map(|rate_dps| Made { rate_dps, ..Made::default() }.recording())
+            .collect();
+        damage(&mut runs[1]);
+        is_right(identified(runs), &["-400dps-1.csv: left out"]);
+    }
+}
+
+fn sensors(recordings: Vec<Recording>) -> Result<Identification, Refusal> {
+    let of = Campaign {
+        instrument: Instrument::Sensor,
+        angular_gain: Some(1.0),
+        period_deg: Some(360.0),
+        ..campaign(recordings)
+    };
+    identify(of, &Options::default())
+}
+
+fn exchanged(mut recording: Recording) -> Recording {
+    std::mem::swap(&mut recording.xc_v, &mut recording.yc_v);
+    recording
+}
+
+#[test]
+fn a_sensor_that_counts_against_what_is_stated_may_have_its_channels_exchanged() {
+    let sensor = Made { rate_dps: 90.0, is_sensor: true, ..Made::default() };
+    let report = sensors(vec![exchanged(sensor.recording())]).unwrap().report;
+    let [low, high] = report.detection_gain_ratio.unwrap().ci95;
+    assert!(low < 1.0 / RATIO + 1e-4 && high > RATIO - 1e-4, "{low} {high}");
+    assert!(report.warnings.iter().any(|w| w.contains("or the channels are exchanged")), "{:?}", report.warnings);
+    // beside sound runs it is the odd one
+    let sound = |rate_dps: f64| Made { rate_dps, ..sensor.clone() }.recording();
+    let report = sensors(vec![sound(60.0), exchanged(sensor.recording()), sound(-45.0)]).unwrap().report;
+    assert!((report.detection_gain_ratio.unwrap().value - RATIO).abs() < 1e-4, "{:?}", report.detection_gain_ratio);
+    assert!(report.warnings.iter().any(|w| w.starts_with("90dps-1.csv: left out")), "{:?}", report.warnings);
+}
+
+#[test]
+fn sensor_runs_that_do_not_agree_on_the_ratio_of_the_gains_are_named_and_the_interval_covers_them() {
+    let sensor = |rate_dps: f64| Made { rate_dps, is_sensor: true, ..Made::default() }.recording();
+    let mut other = sensor(60.0);
+    other.yc_v.iter_mut().flatten().for_each(|v| *v *= 0.99);
+    let report = sensors(vec![sensor(90.0), other]).unwrap().report;
+    let [low, high] = report.detection_gain_ratio.unwrap().ci95;
+    assert!(low < 0.99 * RATIO + 1e-4 && high > RATIO - 1e-4, "{low} {high}: {:?}", report.warnings);
+    assert!(report.warnings.iter().any(|w| w.contains("do not agree on the detection gain ratio")));
 }
 
 #[test]

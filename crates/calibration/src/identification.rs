@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 
 use crate::angle_sensor::{self, curve::Curve};
 use crate::carrier;
+use crate::data::copies::without_copies;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::{PlotContext, PlotData};
@@ -24,7 +25,7 @@ use crate::recording::{Campaign, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
-use crate::report::inference::{Inference, covering};
+use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
@@ -97,8 +98,6 @@ pub struct BiasCurve {
 
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
-/// A run whose mean rate is more than this share of its mean speed turns one way.
-pub(crate) const ONE_WAY: f64 = 0.9;
 /// Identifies the instrument of a campaign.
 ///
 /// # Errors
@@ -115,7 +114,18 @@ pub fn identify_with_plots(campaign: Campaign, options: &Options<'_>) -> Result<
     run(campaign, options, true)
 }
 
-fn run(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+fn run(mut campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+    let mut warnings = Vec::new();
+    let copies = without_copies(&mut campaign, &mut warnings);
+    let mut identified = without_doubles(campaign, options, with_plots)?;
+    identified.report.warnings.extend(warnings);
+    let left_out = |r| RunReport { r#use: "left out".into(), agrees: Some(false), ..run_report(r) };
+    identified.report.runs.extend(copies.iter().map(left_out));
+    Ok(identified)
+}
+
+/// A campaign in which every recording is there once.
+fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
         let mut identified = free_decay::identify(campaign, options, with_plots)?;
@@ -242,14 +252,11 @@ impl Found {
         channels_left.extend(channels(dataset, &fitted.fit, "discovered", &errors.on_fit));
         let inference = Inference { dataset, fitted, covariance: &self.covariance };
         let own_ratios = self.context(&[]).own_detection_ratios();
-        let names = || dataset.tracks.iter().map(|t| t.track.name.as_str());
-        let detection_gain_ratio = inference
-            .detection_ratio(&mut warnings)
-            .map(|all| covering(all, "detection gain ratio", names().zip(own_ratios.iter().copied()), &mut warnings));
+        let detection_gain_ratio = inference.detection_ratio(&own_ratios, &mut warnings);
         let actuation_gain_ratio = inference.actuation_ratio(&mut warnings);
         let effects = inference.effects(&self.steps, &errors.discovered);
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
-        let angular_gain = inference.angular_gain();
+        let angular_gain = inference.angular_gain(&mut warnings);
         let plots = with_plots.then(|| {
             let members = &fitted.fit.hypothesis.members;
             let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
@@ -338,9 +345,7 @@ impl Found {
             .filter_map(|(at, (run, t))| {
                 let ratio = ratios.and_then(|own| own[at]);
                 run.detection_gain_ratio = ratio.filter(|_| run.temp_c.is_some()).map(|[value, _]| value);
-                let (rate, speed) = (t.track.mean_rate(), t.track.mean_speed());
-                let steady = (rate.abs() > ONE_WAY * speed).then_some(rate.to_degrees());
-                Some(Seen::of(run, steady, run.temp_c?))
+                Some(Seen::of(run, t.track.one_way_rate().map(f64::to_degrees), run.temp_c?))
             })
             .collect();
         temperature(&seen, self.fitted.fit.hypothesis.sense())

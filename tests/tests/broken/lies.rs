@@ -1,9 +1,5 @@
 //! No confident lie: small random campaigns with known values, damaged at random. An answer whose 99.9 % interval misses by
 //! more than its width is a lie.
-//!
-//! Known to be left: of two runs at two rates one is of another device, or channels were in each other's place for a while in
-//! both, and what the ratio of the gains differs by is taken for a damping that differs by axis, which goes with the rate as well;
-//! and a sensor alone whose channels were exchanged, for nothing says which way it counts.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +12,7 @@ use super::damages::{DAMAGES, Damage, Shows};
 use super::{Made, RATIO, Told, campaign};
 
 /// Share of the campaigns that may be answered with a lie.
-const LIES: f64 = 0.01;
+const LIES: f64 = 1e-3;
 /// An interval that is narrower than this is none of a measurement.
 const NARROWEST: f64 = 1e-9;
 
@@ -140,14 +136,20 @@ fn told(number: u64) -> Outcome {
     outcome
 }
 
-/// More campaigns: `CVG_TRIALS=10000`; `CVG_TRIAL=17` shows one.
+/// The number that a variable of the environment is set to.
+fn number(variable: &str) -> Option<u64> {
+    std::env::var(variable).ok().and_then(|n| n.parse().ok())
+}
+
+/// More campaigns: `CVG_TRIALS=10000`, others: `CVG_FIRST=10000`; `CVG_TRIAL=17` shows one.
 #[test]
 fn damaged_campaigns_are_not_lied_about() {
-    if let Some(number) = std::env::var("CVG_TRIAL").ok().and_then(|n| n.parse().ok()) {
+    if let Some(number) = number("CVG_TRIAL") {
         println!("{}", outcome(number).what);
         return;
     }
-    let outcomes = all(trials(200), told);
+    let first = number("CVG_FIRST").unwrap_or(0);
+    let outcomes = all(trials(200), |n| told(first + n));
     let mut table: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
     for o in &outcomes {
         let row = table.entry(o.damage).or_default();

@@ -54,6 +54,26 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
     }
 }
 
+/// The gain ratio that each run alone tells by the readout of all, with its standard deviation, where there are several that
+/// turn through a period and more.
+pub(crate) fn own_gain_ratios<'a>(model: &SensorModel, runs: &'a [SensorRun]) -> Vec<(&'a str, Option<[f64; 2]>)> {
+    let Some((readout, weighting)) = model.readout.as_ref().filter(|(r, _)| r.kind >= Kind::Affine && runs.len() > 1)
+    else {
+        return Vec::new();
+    };
+    let gain = model.sensor.gain;
+    let ratio = |run: &[SensorRun]| {
+        Some(LibraryReadout::from(&fit(readout.kind, *weighting, run, gain, readout)?.readout).gain_ratio)
+    };
+    let own = |run: &SensorRun| {
+        let run = std::slice::from_ref(run);
+        let turns = run[0].travel_rad() * gain.abs() >= model.sensor.period;
+        let blocks: Vec<f64> = (0..BLOCKS).filter_map(|block| ratio(&without_block(run, block))).collect();
+        Some([ratio(run)?, jackknife(&blocks)]).filter(|_| turns && blocks.len() == BLOCKS)
+    };
+    runs.iter().map(|r| (r.name.as_str(), own(r))).collect()
+}
+
 /// By what a readout known from its radius alone would differ if the noise of the radius were additive and not in
 /// proportion to it: the algebraic ellipse instead of the one in the logarithm. Where an ellipse is not what the channels
 /// draw the two differ by more than either scatters, and no block tells which is right (Hausman 1978).

@@ -1,12 +1,13 @@
 //! The main job for angle sensors and rate gyroscopes: runs made ready, a model selected and fitted, the held-out rows read
 //! once at the end, and a report of it all.
 
-use super::deviations::deviations;
+use super::deviations::{deviations, own_gain_ratios};
 use super::effects::Described;
 use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, Term};
 use super::report::{Errors, Finding, Head, report};
-use super::samples::{SensorRun, prepare};
+use super::samples::{SensorRun, apart, prepare};
+use super::screening::believed;
 use super::table_fit::Sample;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
@@ -15,6 +16,7 @@ use crate::identification::{Identification, Options};
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::gate::least_held_out;
+use crate::report::inference::{CONTRADICTS, covering};
 use crate::report::{EffectReport, Estimate, ParameterReport, Share};
 use cvg_model::effects::EffectId;
 
@@ -54,11 +56,16 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
         None => campaign.angular_gain,
     };
+    let sense = campaign.angular_gain.map(f64::signum);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let head = Head::of(&campaign);
     (options.progress)("preparing the runs");
-    let mut clipped = Vec::new();
-    let (fitted, held) = prepare(campaign, &mut clipped)?;
+    let mut left_out = Vec::new();
+    let mut runs = prepare(campaign, &mut left_out)?;
+    if !rate_gyroscope {
+        runs = believed(runs, stated, period, &mut left_out)?;
+    }
+    let (fitted, held) = apart(runs)?;
     if !rate_gyroscope {
         require_a_turn(&fitted, stated.unwrap_or(1.0))?;
     }
@@ -70,9 +77,12 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         ));
     }
     (options.progress)("choosing a model of the sensor");
-    let mut finding =
-        if rate_gyroscope { rate_finding(stated, period, &fitted)? } else { sensor_finding(stated, period, &fitted)? };
-    finding.warnings.extend(clipped);
+    let mut finding = if rate_gyroscope {
+        rate_finding(stated, period, &fitted)?
+    } else {
+        sensor_finding(stated, sense, period, &fitted)?
+    };
+    finding.warnings.extend(left_out);
     (options.progress)("measuring the held-out error");
     report(head, finding, &fitted, &held, with_plots)
 }
@@ -104,7 +114,12 @@ fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
     }
 }
 
-fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
+fn sensor_finding(
+    stated: Option<f64>,
+    sense: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+) -> Result<Finding<'static>, Refusal> {
     let model = SensorModel::identify(stated, period, runs)?;
     require_following(runs, model.sensor.gain)?;
     let thinned = thinned(runs);
@@ -131,7 +146,14 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
                 .into(),
         );
     }
-    let gain_ratio = described.gain_ratio();
+    let own = own_gain_ratios(&model, &thinned).into_iter();
+    let all = described.gain_ratio();
+    let all = all.map(|all| covering(all, "detection gain ratio", own, CONTRADICTS, &mut warnings));
+    let against = sense.is_some_and(|s| s * model.sensor.gain < 0.0);
+    let gain_ratio = all.map(|ratio| if against { or_exchanged(ratio) } else { ratio });
+    if against {
+        warnings.push(counts_against(gain_ratio));
+    }
     if gain_ratio.is_none() && !neutral {
         warnings.push("detection_gain_ratio is null: no gain and skew were needed to predict the angle".into());
     }
@@ -174,6 +196,31 @@ fn sensor_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Resul
         }),
         period,
     })
+}
+
+/// A gain ratio with an interval that also covers its inverse: what it would be with the channels in each other's place.
+fn or_exchanged(ratio: Estimate) -> Estimate {
+    let [low, high] = ratio.ci95;
+    if low <= 0.0 {
+        return ratio;
+    }
+    Estimate { ci95: [low.min(high.recip()), high.max(low.recip())], ..ratio }
+}
+
+/// Says that a sensor counts the other way than the campaign states.
+fn counts_against(ratio: Option<Estimate>) -> String {
+    let exchanged = ratio.map_or(String::new(), |ratio| {
+        format!(
+            "; if xc_v and yc_v stand in each other's place, the detection gain ratio is {:.5} and not {:.5}, and its \
+             interval covers both",
+            ratio.value.recip(),
+            ratio.value
+        )
+    });
+    format!(
+        "the angle counts the other way than the campaign states with the sign of angular_gain: that sign is wrong, or that \
+         of the reference, or the channels are exchanged{exchanged}"
+    )
 }
 
 fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {

@@ -17,6 +17,7 @@ mod readout_fit;
 pub(crate) mod reference_free;
 mod report;
 mod samples;
+mod screening;
 mod selection;
 mod sensor;
 mod table_fit;

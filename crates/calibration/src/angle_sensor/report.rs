@@ -4,6 +4,7 @@
 use super::curve::Curve;
 use super::readout::Readout;
 use super::samples::SensorRun;
+use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::{
@@ -13,7 +14,7 @@ use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::residuals::Residual;
 use crate::estimation::statistics::median;
-use crate::identification::{BiasCurve, Figures, Identification, ONE_WAY, run_report};
+use crate::identification::{BiasCurve, Figures, Identification, run_report};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::{Campaign, Instrument};
 use crate::report::calibration::{Calibration, Provenance};
@@ -199,7 +200,7 @@ pub(crate) fn report(
             instrument: finding.instrument,
             period_deg: finding.period.to_degrees(),
             // what hardly turns has a bias, and a gain that nobody can judge
-            tells_gain: gate::gain_is_told(&report.angular_gain),
+            tells_gain: gate::gain_is_told(&report.angular_gain) || fitted.iter().any(turns),
             stated: finding.stated_gain,
             held_out: after.errors().count(),
             fitted_rms_deg: on_fit.size().rms_deg,
@@ -207,6 +208,11 @@ pub(crate) fn report(
         gate::pass(&report, &calibration, facts)?;
     }
     Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })
+}
+
+/// The reference turns so far that there is an angular gain to tell: a turn.
+fn turns(run: &SensorRun) -> bool {
+    run.travel_rad() > std::f64::consts::TAU
 }
 
 /// A run's errors as the residual diagnostics take them.
@@ -350,6 +356,10 @@ fn runs(
             (false, true) => "fit".into(),
             (false, false) => "holdout".into(),
         };
+    }
+    let used = |number: usize| fitted.iter().chain(held).any(|r| r.number == number);
+    for (_, r) in out.iter_mut().enumerate().filter(|(number, _)| !used(*number)) {
+        (r.r#use, r.agrees) = ("left out".into(), Some(false));
     }
     let seen: Vec<Seen> =
         out.iter().zip(steady).filter_map(|(r, steady)| Some(Seen::of(r, steady, r.temp_c?))).collect();

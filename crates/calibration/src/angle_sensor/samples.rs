@@ -147,21 +147,17 @@ impl SensorRun {
     }
 }
 
-/// Makes the rotation runs of a campaign ready: those to fit, and those held out. Where none is held out, the last
-/// quarter in time of each is. Says which rows are left out.
+/// Makes the rotation runs of a campaign ready. Says which rows are left out.
 ///
 /// # Errors
-/// Where a run has no reference or nothing to fit is left.
-pub(crate) fn prepare(
-    campaign: Campaign,
-    warnings: &mut Vec<String>,
-) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
+/// Where a run has no reference.
+pub(crate) fn prepare(campaign: Campaign, warnings: &mut Vec<String>) -> Result<Vec<SensorRun>, Refusal> {
     let stated = campaign.reference;
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::new(r, i, stated));
-    apart(without_rails_of_their_own(&runs.collect::<Result<Vec<_>, _>>()?, warnings))
+    Ok(without_rails_of_their_own(&runs.collect::<Result<Vec<_>, _>>()?, warnings))
 }
 
-/// The runs to fit, and those held out.
+/// The runs to fit, and those held out. Where none is held out, the last quarter in time of each is.
 ///
 /// # Errors
 /// Where nothing to fit is left.

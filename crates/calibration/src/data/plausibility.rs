@@ -6,18 +6,19 @@
 
 use std::ops::Range;
 
+use crate::data::copies;
 use crate::data::rail::rows_at_rails;
 use crate::estimation::statistics::median;
 use crate::recording::{Channel, Recording};
 
 /// A held value makes up for it by more than this many of its usual smallest steps.
-const JUMP: f64 = 3.0;
+pub(super) const JUMP: f64 = 3.0;
 /// The smallest steps of a column: this share of all that are not zero are smaller.
 const SMALLEST: f64 = 0.05;
-/// So many rows in a row are held in one channel alone before it counts.
-const HELD_ALONE: usize = 5;
+/// So many rows in a row are held in one channel alone, or alike in both, before it counts.
+pub(super) const HELD_ALONE: usize = 5;
 /// More than this share of the rows of a recording cannot be lost from it, unless all of it is held alike.
-const MOST_LOST: f64 = 0.3;
+pub(crate) const MOST_LOST: f64 = 0.3;
 /// A recording is held throughout where this share of its values is of one age.
 const THROUGHOUT: f64 = 0.8;
 /// A value that is clipped stands still for more than this many times as long as a step of its converter makes it.
@@ -70,20 +71,17 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
             .push(format!("{name}: {clipped} rows stand at the rail of a channel and are left out: it is clipped"));
         leave_out(recording, &at_rails);
     }
+    copies::leave_out(recording, &name, &mut findings);
+    if findings.broken.is_some() {
+        return findings;
+    }
     let rows = recording.len();
     let held = held_rows(recording);
     let lost: usize = held.iter().map(Range::len).sum();
     if lost == 0 {
         return findings;
     }
-    let place = |r: &Range<usize>| {
-        let t = &recording.t_s;
-        format!("rows {} to {} ({:.3} s to {:.3} s)", r.start + 1, r.end, t[r.start], t[r.end - 1])
-    };
-    let mut longest: Vec<&Range<usize>> = held.iter().collect();
-    longest.sort_by_key(|r| (std::cmp::Reverse(r.len()), r.start));
-    let list: Vec<String> = longest.iter().take(3).map(|r| place(r)).collect();
-    let more = if held.len() > 3 { format!(" and {} more stretches", held.len() - 3) } else { String::new() };
+    let places = places(&recording.t_s, &held);
     let usual = median(&mut held.iter().map(|r| r.len() as f64).collect::<Vec<_>>());
     let alike = held.iter().filter(|r| (r.len() as f64 - usual).abs() < 0.5).map(Range::len).sum::<usize>();
     let throughout =
@@ -96,23 +94,30 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
         ));
     } else if lost as f64 > MOST_LOST * rows as f64 {
         findings.broken = Some(Broken {
-            problem: format!(
-                "{lost} of {rows} rows repeat the one before while the table turns: {}{more}",
-                list.join(", ")
-            ),
+            problem: format!("{lost} of {rows} rows repeat the one before while the table turns: {places}"),
             wanted: "a recording whose values are read anew for every row".into(),
         });
         return findings;
     } else {
         findings.warnings.push(format!(
-            "{name}: values stand still while the table turns: {}{more}; these {lost} rows are left out",
-            list.join(", ")
+            "{name}: values stand still while the table turns: {places}; these {lost} rows are left out"
         ));
     }
     let mut repeated = vec![false; rows];
     held.into_iter().for_each(|r| repeated[r].fill(true));
     leave_out(recording, &repeated);
     findings
+}
+
+/// Where these rows are, by number and time: the longest stretches, and how many more there are.
+pub(crate) fn places(t: &[f64], rows: &[Range<usize>]) -> String {
+    let place =
+        |r: &Range<usize>| format!("rows {} to {} ({:.3} s to {:.3} s)", r.start + 1, r.end, t[r.start], t[r.end - 1]);
+    let mut longest: Vec<&Range<usize>> = rows.iter().collect();
+    longest.sort_by_key(|r| (std::cmp::Reverse(r.len()), r.start));
+    let list: Vec<String> = longest.iter().take(3).map(|r| place(r)).collect();
+    let more = if rows.len() > 3 { format!(" and {} more stretches", rows.len() - 3) } else { String::new() };
+    format!("{}{more}", list.join(", "))
 }
 
 /// Rows that say what the row before says although the table turned: in all channels of the angle at once, in one of them,
@@ -153,7 +158,7 @@ pub(crate) fn held_rows(recording: &Recording) -> Vec<Range<usize>> {
 
 /// One column and the size of its small steps.
 #[derive(Debug)]
-struct Column<'a> {
+pub(super) struct Column<'a> {
     values: &'a [f64],
     period: Option<f64>,
     /// a small step, the smallest one, and a usual one
@@ -167,7 +172,7 @@ struct Column<'a> {
 
 impl<'a> Column<'a> {
     /// `None` of a column that never changes.
-    fn new(values: &'a [f64], period: Option<f64>) -> Option<Self> {
+    pub(super) fn new(values: &'a [f64], period: Option<f64>) -> Option<Self> {
         let span = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
         let mut column = Self { values, period, small: 0.0, smallest: 0.0, usual: 0.0, span, is_main: false };
         let mut steps: Vec<f64> = (1..values.len()).map(|i| column.step(i - 1, i)).filter(|d| *d > 0.0).collect();
@@ -206,7 +211,7 @@ impl<'a> Column<'a> {
     }
 
     /// How far it moved, in its small steps.
-    fn moved(&self, from: usize, to: usize) -> f64 {
+    pub(super) fn moved(&self, from: usize, to: usize) -> f64 {
         self.step(from, to) / self.small
     }
 }
@@ -218,7 +223,7 @@ fn caught_up<'a>(mut columns: impl Iterator<Item = &'a Column<'a>>, held: &Range
 }
 
 /// Ranges of rows, the first row of a recording aside, for which `is` holds.
-fn repeats(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+pub(super) fn repeats(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     for i in (1..rows).filter(|i| is(*i)) {
         match out.last_mut() {
@@ -249,7 +254,7 @@ impl<'a> Input<'a> {
 }
 
 /// Takes rows out of every channel. Columns of unknown meaning go: nothing here asks for them.
-fn leave_out(recording: &mut Recording, rows: &[bool]) {
+pub(super) fn leave_out(recording: &mut Recording, rows: &[bool]) {
     for channel in Channel::ALL {
         if let Some(values) = recording.channel(channel) {
             let kept = values.iter().zip(rows).filter(|(_, out)| !**out).map(|(v, _)| *v).collect();
@@ -350,11 +355,11 @@ fn within_a_turn(deg: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// 20 s at 500 deg/s and 100 Hz, k = 0.78, with the noise of a good readout.
-    fn recorded() -> Recording {
+    pub(in crate::data) fn recorded() -> Recording {
         let mut state = 1u64;
         let mut noise = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -63,6 +63,8 @@ const FITTED_SHARE: f64 = 0.75;
 const ENOUGH_SAMPLES: usize = 100_000;
 /// Largest turn of the table between the samples of a thinned run, rad.
 const LARGEST_THINNED_TURN: f64 = 0.15;
+/// A run whose mean rate is more than this share of its mean speed turns one way.
+pub(crate) const ONE_WAY: f64 = 0.9;
 /// A segment needs this many samples to carry a bias of its own.
 const SHORTEST_SEGMENT: usize = 16;
 
@@ -275,6 +277,11 @@ impl Track {
         let (sum, count) =
             (0..self.t_s.len()).step_by(step).fold((0.0, 0.0), |(sum, n), i| (sum + ellipticity(i).min(1.0), n + 1.0));
         0.5 * split_rad_s * sum / count
+    }
+
+    /// Mean input rate of a run that turns one way, rad/s.
+    pub(crate) fn one_way_rate(&self) -> Option<f64> {
+        Some(self.mean_rate()).filter(|rate| rate.abs() > ONE_WAY * self.mean_speed())
     }
 
     /// Mean input rate over the settled run, rad/s.

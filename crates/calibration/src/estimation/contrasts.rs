@@ -1,7 +1,7 @@
 //! In what the fitted runs of a campaign differ: rate, direction, speed, amplitude, temperature. What they have in common
 //! is what they can't tell apart.
 
-use crate::data::track::Track;
+use crate::data::track::{Segment, Track};
 use crate::estimation::identifiability::Alike;
 use crate::estimation::joint_fit::Dataset;
 use crate::recording::Role;
@@ -18,23 +18,55 @@ const EDGE: usize = 30;
 /// Temperatures that differ by less than this are one, K.
 const SAME_TEMPERATURE_K: f64 = 1.0;
 
+/// Rates of the table over short stretches of one segment after the other, rad/s; stops left out.
+fn stretches<'a>(of: impl Iterator<Item = (&'a Track, Vec<Segment>)>) -> Vec<Vec<f64>> {
+    let mut rates: Vec<Vec<f64>> = of
+        .flat_map(|(t, segments)| segments.into_iter().map(move |s| (t, s.range)))
+        .map(|(t, range)| {
+            let step = (range.len() / STRETCHES).max(1);
+            let ends = range.clone().step_by(step).zip(range.clone().skip(step).step_by(step));
+            ends.map(|(i, j)| (t.input_rad[j] - t.input_rad[i]) / (t.t_s[j] - t.t_s[i])).collect()
+        })
+        .collect();
+    let fastest = rates.iter().flatten().fold(0.0, |m: f64, r| m.max(r.abs()));
+    for r in &mut rates {
+        r.retain(|r| r.abs() > SAME_RATE * fastest);
+    }
+    rates
+}
+
+/// Some of these rates are of either direction.
+fn both_directions(rates: &[Vec<f64>]) -> bool {
+    let any = |sign: f64| rates.iter().flatten().any(|r| r * sign > 0.0);
+    any(1.0) && any(-1.0)
+}
+
+/// The fastest of these rates and the slowest are not one speed.
+fn speeds_differ(rates: &[Vec<f64>]) -> bool {
+    let mut speeds: Vec<f64> = rates.iter().flatten().map(|r| r.abs()).collect();
+    speeds.sort_by(f64::total_cmp);
+    let edge = speeds.len() / EDGE;
+    !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
+}
+
 impl Dataset {
     /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.
     fn stretches(&self) -> Vec<Vec<f64>> {
-        let tracks = self.tracks.iter().map(|p| &p.track);
-        let mut rates: Vec<Vec<f64>> = tracks
-            .flat_map(|t| t.segments.iter().filter(|s| s.role == Role::Fit).map(move |s| (t, &s.range)))
-            .map(|(t, range)| {
-                let step = (range.len() / STRETCHES).max(1);
-                let ends = range.clone().step_by(step).zip(range.clone().skip(step).step_by(step));
-                ends.map(|(i, j)| (t.input_rad[j] - t.input_rad[i]) / (t.t_s[j] - t.t_s[i])).collect()
-            })
-            .collect();
-        let fastest = rates.iter().flatten().fold(0.0, |m: f64, r| m.max(r.abs()));
-        for r in &mut rates {
-            r.retain(|r| r.abs() > SAME_RATE * fastest);
-        }
-        rates
+        let fitted = |t: &'_ Track| t.segments.iter().filter(|s| s.role == Role::Fit).cloned().collect();
+        stretches(self.tracks.iter().map(|p| (&p.track, fitted(&p.track))))
+    }
+
+    /// Causes that differ in how they go with the rate are told apart by how the runs differ, and without one of them the
+    /// others would not: no other run bears out what it says, and were it of another instrument, nothing would contradict.
+    /// A run whose own rate varies tells them by itself; one that is held out bears out what was fitted.
+    pub(crate) fn rests_on_one_run(&self) -> bool {
+        let differ = |of: &dyn Fn(usize) -> bool| {
+            let these = self.tracks.iter().enumerate().filter(|(at, _)| of(*at));
+            let rates = stretches(these.map(|(_, p)| (&p.track, p.track.segments.clone())));
+            both_directions(&rates) || speeds_differ(&rates)
+        };
+        let all = || 0..self.tracks.len();
+        all().any(|one| !differ(&|at| at != one)) && !all().any(|one| differ(&|at| at == one)) && differ(&|_| true)
     }
 
     /// The rate changes within a fitted run, as in a turn there and back.
@@ -51,17 +83,12 @@ impl Dataset {
 
     /// The table turns both ways in what is fitted.
     pub(crate) fn both_directions(&self) -> bool {
-        let rates = self.stretches();
-        let any = |sign: f64| rates.iter().flatten().any(|r| r * sign > 0.0);
-        any(1.0) && any(-1.0)
+        both_directions(&self.stretches())
     }
 
     /// The table turns at two or more speeds in what is fitted.
     pub(crate) fn speeds_differ(&self) -> bool {
-        let mut speeds: Vec<f64> = self.stretches().into_iter().flatten().map(f64::abs).collect();
-        speeds.sort_by(f64::total_cmp);
-        let edge = speeds.len() / EDGE;
-        !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
+        speeds_differ(&self.stretches())
     }
 
     /// What the fitted runs have in common.

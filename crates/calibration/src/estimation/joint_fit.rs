@@ -3,7 +3,6 @@
 use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
@@ -79,27 +78,13 @@ impl Dataset {
         for r in rotations.iter().chain(&ring_down_runs) {
             warnings.extend(r.recording.warnings.iter().cloned());
         }
-        let split = rotations.iter().all(|r| r.role == Role::Fit);
         let mut screen = Screen::new(stated(&campaign.angular_gain)?, rotations.len());
-        let tracks: Vec<Track> = screen
-            .mended(rotations, &mut warnings)?
-            .into_iter()
-            .map(|r| Track::new(r, period_rad, split))
-            .collect::<Result<_, _>>()?;
-        if tracks.iter().all(|t| t.samples(Role::Fit) == 0) {
-            return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
-        }
+        let sound = screen.mended(rotations, &mut warnings)?;
+        let tracks = screen.tracks(sound, period_rad, &mut warnings)?;
         let mut start = Hypothesis::ideal(instrument, period_rad, campaign.angular_gain.unwrap_or(0.8));
         let mut prepared = Vec::new();
         let mut gains = Vec::new();
         for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
-            if motion.travel < std::f64::consts::PI {
-                return Err(Refusal::new(
-                    &track.name,
-                    format!("the pattern turns through {:.1}° only", motion.travel.to_degrees()),
-                    "at least half a turn (180°)",
-                ));
-            }
             gains.push((motion.angular_gain, motion.travel.powi(2) * track.t_s.len() as f64));
             let limit = Noise { angle: SPIKE * motion.deviation + LEAST_NOISE, amplitude: f64::INFINITY };
             let by_amplitude = instrument == Instrument::Sensor && track.has_amplitude();
@@ -111,6 +96,9 @@ impl Dataset {
             // what a split of the frequencies does to the pattern goes with a quadrature that nobody recorded
             let drifts = instrument == Instrument::Gyroscope && !track.records_the_loops();
             prepared.push(Prepared { noise, white, limit, starts: motion.starts, drifts, track });
+        }
+        if prepared.iter().all(|p| p.track.samples(Role::Fit) == 0) {
+            return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
         }
         let weight: f64 = gains.iter().map(|g| g.1).sum();
         start.angular_gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight;

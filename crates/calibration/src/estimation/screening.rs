@@ -105,6 +105,44 @@ impl Screen {
         Ok(sound)
     }
 
+    /// The runs made ready, and those that cannot be left out; of what they tell nothing is asked yet.
+    ///
+    /// # Errors
+    /// Where too few are left.
+    pub(crate) fn tracks(
+        &mut self,
+        runs: Vec<Run>,
+        period_rad: f64,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Track>, Refusal> {
+        let split = runs.iter().all(|r| r.role == Role::Fit);
+        let tracks = runs.into_iter().map(|r| Track::new(r, period_rad, split)).collect();
+        self.ready(tracks, warnings)
+    }
+
+    /// What could be made of the runs that are in; those of which it could not are left out.
+    ///
+    /// # Errors
+    /// The first of why not, where too few are left.
+    fn ready<T>(&mut self, made: Vec<Result<T, Refusal>>, warnings: &mut Vec<String>) -> Result<Vec<T>, Refusal> {
+        let (count, numbers) = (made.len(), self.kept.clone());
+        let (mut ready, mut failed) = (Vec::with_capacity(count), Vec::new());
+        for (number, made) in numbers.into_iter().zip(made) {
+            match made {
+                Ok(made) => ready.push(made),
+                Err(why) => failed.push((number, why)),
+            }
+        }
+        if failed.len() as f64 > MOST_BROKEN * count as f64 || ready.is_empty() {
+            return failed.into_iter().next().map_or(Ok(ready), |(_, why)| Err(why));
+        }
+        for (number, why) in failed {
+            let place = if why.place.is_empty() { "a run" } else { &why.place };
+            self.leave_out(number, place, &why.problem, warnings);
+        }
+        Ok(ready)
+    }
+
     /// How each run moves, of those that can be believed.
     ///
     /// # Errors
@@ -117,7 +155,8 @@ impl Screen {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(Track, Motion)>, Refusal> {
         let open = Guess::Open(self.stated);
-        let first: Vec<Motion> = tracks.iter().map(|t| motion(t, start, open)).collect::<Result<_, _>>()?;
+        let moving = tracks.into_iter().map(|t| motion(&t, start, open).map(|m| (t, m))).collect();
+        let (tracks, first): (Vec<Track>, Vec<Motion>) = self.ready(moving, warnings)?.into_iter().unzip();
         let guess = self.settle(&tracks, &first, start)?;
         let mut moving: Vec<(Track, Motion)> = Vec::with_capacity(tracks.len());
         let mut odd: Vec<(usize, String)> = Vec::new();
@@ -161,7 +200,14 @@ impl Screen {
             }
             self.counts_as_stated(&moving)?;
         }
-        Ok(moving)
+        let far_enough = |(track, motion): (Track, Motion)| {
+            if motion.travel >= std::f64::consts::PI {
+                return Ok((track, motion));
+            }
+            let problem = format!("the pattern turns through {:.1}° only", motion.travel.to_degrees());
+            Err(Refusal::new(&track.name, problem, "at least half a turn (180°)"))
+        };
+        self.ready(moving.into_iter().map(far_enough).collect(), warnings)
     }
 
     /// The runs without those at these places.

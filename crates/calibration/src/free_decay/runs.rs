@@ -13,6 +13,8 @@ use crate::recording::{Role, Run};
 
 /// Stretches that a run is divided into at most.
 const MOST_STRETCHES: usize = 1500;
+/// An energy that grows by this factor, while it should fall, is none of a decay: gains that differ by a tenth make 1.2 of it.
+const GROWS: f64 = 1.5;
 /// Stretches that a run needs.
 const FEWEST_STRETCHES: usize = 24;
 /// A vibration below this many times its noise is left out: what unequal noises of the channels add to R and S is then
@@ -89,6 +91,10 @@ impl DecayRun {
             let problem = format!("only {clear} rows of a vibration that stands clear of its noise");
             return Err(Refusal::no_answer(&name, problem, "a longer decay, or one that begins with more amplitude"));
         }
+        if grows(&z[..clear]) {
+            let problem = "the amplitude grows: this is no free decay, or its rows stand from last to first";
+            return Err(Refusal::no_answer(&name, problem, "a resonator that rings without loops or forces"));
+        }
         let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
         let step = median(&mut steps);
         let stretch = |i: usize| i * each..(i + 1) * each;
@@ -109,6 +115,13 @@ impl DecayRun {
             rows: z.len(),
         })
     }
+}
+
+/// Whether the energy of the last fifth exceeds that of the first by more than unequal gains make of a pattern that turns.
+fn grows(z: &[Envelope<f64>]) -> bool {
+    let fifth = z.len() / 5;
+    let energy = |part: &[Envelope<f64>]| part.iter().map(|e| stokes::of(e)[0]).sum::<f64>();
+    energy(&z[z.len() - fifth..]) > GROWS * energy(&z[..fifth])
 }
 
 /// The rows up to the first long gap.
@@ -188,6 +201,14 @@ mod tests {
             let (cos, sin) = overlap(&e, &phased(&e, phase));
             assert!((sin.atan2(cos) - phase).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn a_decay_from_last_to_first_is_none() {
+        let z: Vec<Envelope<f64>> = (0..100)
+            .map(|i| Envelope::zero() + Envelope::new(1.0, 0.0, 0.5, 0.0) * (-0.01 * f64::from(i)).exp())
+            .collect();
+        assert!(!grows(&z) && grows(&z.iter().rev().copied().collect::<Vec<_>>()));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stag
 use nalgebra::DMatrix;
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
@@ -27,19 +28,23 @@ pub(crate) struct Inference<'a> {
 }
 
 /// What a run says by itself contradicts all runs beyond this many of its standard deviations.
-const CONTRADICTS: f64 = 6.0;
+pub(crate) const CONTRADICTS: f64 = 6.0;
+/// A drift that contradicts what is believed of drifts, in standard deviations of that: 1 in 100.
+const UNBELIEVED: f64 = 2.33;
 
 /// An estimate from all runs whose interval also covers what single runs contradict it with, each with its standard
-/// deviation: the fit takes what runs differ in for noise, and many samples make little of that. Says which do.
+/// deviation, beyond so many of them: the fit takes what runs differ in for noise, and many samples make little of that. Says
+/// which do.
 pub(crate) fn covering<'a>(
     all: Estimate,
     what: &str,
     runs: impl Iterator<Item = (&'a str, Option<[f64; 2]>)>,
+    beyond: f64,
     warnings: &mut Vec<String>,
 ) -> Estimate {
     let half = all.half_width();
     let off = |own: f64| (own - all.value).abs();
-    let contradicts = |own: f64, deviation: f64| off(own) > half.max(CONTRADICTS * deviation);
+    let contradicts = |own: f64, deviation: f64| off(own) > half.max(beyond * deviation);
     let odd: Vec<(&str, f64)> =
         runs.filter_map(|(run, own)| own.filter(|[v, d]| contradicts(*v, *d)).map(|[v, _]| (run, v))).collect();
     let Some(farthest) = odd.iter().map(|(_, own)| off(*own)).max_by(f64::total_cmp) else { return all };
@@ -70,8 +75,9 @@ impl Inference<'_> {
     }
 
     /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
-    /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for.
-    pub(crate) fn angular_gain(&self) -> Estimate {
+    /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for. So
+    /// is what single runs contradict it with.
+    pub(crate) fn angular_gain(&self, warnings: &mut Vec<String>) -> Estimate {
         let estimate = self.estimate(Unknown::AngularGain);
         let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
         let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
@@ -80,7 +86,22 @@ impl Inference<'_> {
             .filter(|m| m.id.description().stage == Stage::Mechanics)
             .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
             .sum();
-        estimate.widened(slowed * estimate.value.abs())
+        let estimate = estimate.widened(slowed * estimate.value.abs());
+        covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings)
+    }
+
+    /// The angular gain that each track tells where it turns one way and drifted by nothing, and how far off that is by as
+    /// much drift as is believed. Where the commands were not recorded, what runs differ in is taken for a drift of each; a
+    /// drift that is not believed is a gain of another instrument, another clock or another rate as well.
+    fn own_angular_gains(&self) -> impl Iterator<Item = (&str, Option<[f64; 2]>)> {
+        let sense = self.hypothesis().sense();
+        self.dataset.tracks.iter().zip(&self.fitted.fit.starts).map(move |(p, starts)| {
+            let fitted = p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit);
+            let longest = fitted.max_by_key(|(s, _)| s.range.len()).filter(|_| p.drifts);
+            let steady = longest.zip(p.track.one_way_rate());
+            let k = self.hypothesis().angular_gain;
+            (p.track.name.as_str(), steady.map(|((_, s), rate)| [k + sense * s.drift / rate, DRIFT_RAD_S / rate.abs()]))
+        })
     }
 
     /// The first parameter of the first member `id`, if it was fitted.
@@ -89,14 +110,41 @@ impl Inference<'_> {
         self.index(unknown).map(|_| unknown)
     }
 
-    /// G_Dy/G_Dx, where the campaign identifies it.
-    pub(crate) fn detection_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+    /// G_Dy/G_Dx, where the campaign identifies it, with what each track alone tells of it.
+    pub(crate) fn detection_ratio(&self, own: &[Option<[f64; 2]>], warnings: &mut Vec<String>) -> Option<Estimate> {
         let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
         let identified = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
         if identified.is_none() {
             warnings.push("the campaign cannot tell the detection gain ratio".into());
         }
-        identified
+        let runs = self.dataset.tracks.iter().map(|t| t.track.name.as_str()).zip(own.iter().copied());
+        let ratio = covering(identified?, "detection gain ratio", runs, CONTRADICTS, warnings);
+        Some(self.borne_out(ratio, warnings))
+    }
+
+    /// The detection gain ratio with an interval that also covers what the runs would tell of it without anisodamping, where
+    /// the two are told apart by a run that no other bears out: ½(g − 1) sin 2θ of the readout beside Δ(1/τ)/(4kΩ) sin 2θ of
+    /// the mechanics. Were that run of another instrument, the difference would be that of two ratios.
+    fn borne_out(&self, ratio: Estimate, warnings: &mut Vec<String>) -> Estimate {
+        let damping = self.hypothesis().member(EffectId::Anisodamping).map_or(0.0, |m| m.values[1]);
+        if self.dataset.instrument == Instrument::Sensor || !self.dataset.rests_on_one_run() {
+            return ratio;
+        }
+        let alone = |rate: f64| ratio.value - 0.5 * damping / self.hypothesis().precession(rate);
+        let runs = self.dataset.tracks.iter().map(|t| (t.track.name.as_str(), alone(t.track.mean_rate())));
+        let odd: Vec<(&str, f64)> = runs.filter(|(_, own)| (own - ratio.value).abs() > ratio.half_width()).collect();
+        if odd.is_empty() {
+            return ratio;
+        }
+        let said: Vec<String> = odd.iter().take(4).map(|(run, own)| format!("{run} {own:.5}")).collect();
+        warnings.push(format!(
+            "the detection gain ratio, {:.5}, and anisodamping are told apart by a run that no other bears out: without \
+             anisodamping the runs differ in the ratio, {}, and its interval covers them; a rotation run at yet another rate \
+             would tell",
+            ratio.value,
+            said.join(", ")
+        ));
+        odd.iter().fold(ratio, |e, (_, own)| Estimate { ci95: [e.ci95[0].min(*own), e.ci95[1].max(*own)], ..e })
     }
 
     /// G_Ax/G_Ay, where the campaign identifies it.
@@ -279,7 +327,7 @@ mod tests {
         let told = |own: [f64; 2]| {
             let mut warnings = Vec::new();
             let runs = [("a.csv", Some([1.0132, 1e-5])), ("b.csv", Some(own)), ("c.csv", None)];
-            (covering(all, "detection gain ratio", runs.into_iter(), &mut warnings), warnings)
+            (covering(all, "detection gain ratio", runs.into_iter(), CONTRADICTS, &mut warnings), warnings)
         };
         let (estimate, warnings) = told([1.0152, 1e-5]);
         assert!((estimate.ci95[1] - 1.0152).abs() < 1e-12 && (estimate.ci95[0] - 1.0112).abs() < 1e-12, "{estimate:?}");
