@@ -177,6 +177,21 @@ pub struct Loop<'a, T> {
     still: (Resonator<f64>, Resonator<f64>),
     /// what ratio and skew have wandered
     wandered: (f64, f64),
+    /// virtual precession that a bench asks for, rad/s, besides the calibrator's own
+    pub asked_rad_s: f64,
+    /// what a recording has of the last control step
+    pub row: Row,
+}
+
+/// What a recording has of a control step: the readout as it came, and the commands.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Row {
+    /// the readout
+    pub readout: Envelope<f64>,
+    /// v_as
+    pub energy_v: f64,
+    /// v_qc
+    pub quadrature_v: f64,
 }
 
 impl<'a, T: Float> Loop<'a, T> {
@@ -200,6 +215,8 @@ impl<'a, T: Float> Loop<'a, T> {
             explained: 0.0,
             still: (device.resonator(false), device.resonator(true)),
             wandered: (0.0, 0.0),
+            asked_rad_s: 0.0,
+            row: Row::default(),
         }
     }
 
@@ -262,7 +279,7 @@ impl<'a, T: Float> Loop<'a, T> {
         self.quadrature += p.q * dt;
         let forward = self.calibrator.forward(&self.state, own(cos), own(sin), own(1.0));
         let v_qc = -8.0 * (p.q + self.quadrature / 0.5) + forward.quadrature_v.to_f64();
-        let v_qs = forward.precession_v.to_f64();
+        let v_qs = forward.precession_v.to_f64() - self.asked_rad_s;
         self.phase += p.l * 200.0 * dt;
         let ahead = 40.0 * p.l + self.phase - forward.detuning_rad_s.to_f64();
         let wanted = AxisForces {
@@ -276,6 +293,7 @@ impl<'a, T: Float> Loop<'a, T> {
             &AxisForces { x_c: own(wanted.x_c), x_s: own(wanted.x_s), y_c: own(wanted.y_c), y_s: own(wanted.y_s) },
         );
         let f = AxisForces { x_c: f.x_c.to_f64(), x_s: f.x_s.to_f64(), y_c: f.y_c.to_f64(), y_s: f.y_s.to_f64() };
+        self.row = Row { readout: raw, energy_v: v_as, quadrature_v: v_qc };
         let pendulum = cvg_model::Pendulum { e: own(p.e), q: own(p.q), r: own(p.r), s: own(p.s), l: own(p.l) };
         let commands = Commands { energy_v: own(v_as), precession_v: own(v_qs), quadrature_v: own(v_qc) };
         let direction = (own(cos), own(sin));

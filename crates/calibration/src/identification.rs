@@ -404,6 +404,10 @@ fn require_a_reference(campaign: &Campaign) -> Result<(), Refusal> {
         let name = run.file.display().to_string();
         return Err(Refusal::new(&name, "a run at rest has no angular gain", "cvg_calibration::answer"));
     }
+    if let Some(run) = campaign.runs.iter().find(|r| r.kind == RunKind::Virtual) {
+        let name = run.file.display().to_string();
+        return Err(Refusal::new(&name, "virtual precession has no reference", "cvg_calibration::answer"));
+    }
     if campaign.reference == Some(Reference::Absent) {
         let wanted = "rate_dps or table_deg, or instrument = \"sensor\"";
         return Err(Refusal::new(

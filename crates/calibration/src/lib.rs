@@ -45,6 +45,7 @@ mod model;
 pub mod report;
 mod selection;
 mod survey;
+mod virtual_precession;
 
 pub use angle_sensor::curve::Curve;
 pub use cvg_recording as recording;

@@ -11,6 +11,7 @@ use crate::recording::{Campaign, Run};
 use crate::report::calibration::Calibration;
 use crate::report::survey::Survey;
 use crate::report::{Allan, Estimate, RunReport, provenance};
+use crate::virtual_precession;
 
 /// What a campaign told.
 #[derive(Debug, Clone)]
@@ -39,12 +40,15 @@ struct Rest {
     warnings: Vec<String>,
 }
 
-/// Answers a campaign: runs at rest by the Allan deviation of their angle, a sensor without a reference by its radius, all
-/// else by [`crate::identify()`].
+/// Answers a campaign: runs at rest by the Allan deviation of their angle, a sensor without a reference by its radius, virtual
+/// precession and unknown rotation by the filter that flies, all else by [`crate::identify()`].
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
 pub fn answer(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
+    if virtual_precession::serves(&campaign) {
+        return virtual_precession::identify(&campaign, options).map(|s| Answer::Surveyed(Box::new(s)));
+    }
     let hint = likeness::hint(&campaign);
     let files = provenance::files(&campaign);
     let at_rest = at_rest::take(&mut campaign);

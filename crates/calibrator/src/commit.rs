@@ -9,6 +9,8 @@ use crate::state::{Commit, State};
 use crate::ud::Ud;
 
 const SHARE: u16 = MEASURE + 1;
+/// The slice after that of the last parameter.
+pub(crate) const SHARED: u16 = 37;
 const LAST: u16 = 40;
 /// Standard deviations of a direction that is committed.
 const SIGMAS: f64 = 3.0;
@@ -38,7 +40,7 @@ impl<T: Float> Calibrator<T> {
                 }
             }
             MEASURE => self.decide(s),
-            SHARE..37 => self.share(s, usize::from(k - SHARE)),
+            SHARE..SHARED => self.share(s, usize::from(k - SHARE)),
             LAST => self.put_in_force(s),
             _ => {}
         }

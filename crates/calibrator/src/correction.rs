@@ -125,6 +125,29 @@ impl<T: Float> Correction<T> {
         Self::of(known, y_of_y, y_of_x, drives)
     }
 
+    /// The same with skews in phase with what they are skews of, which no parameter says: the Y readout delays what it sees
+    /// of X as it delays Y, and the drives what they push across as what they push along. None where that is no instrument.
+    pub(crate) fn skews_in_phase(&self) -> Option<Self> {
+        let slope = |z: Complex<T>| z.im / z.re;
+        let at = |re: T, slope: T| Complex::new(re, re * slope);
+        let y_of_x = at(self.y_of_x.re, slope(self.y_of_y));
+        let common = T::half() * (slope(self.drives.xx) + slope(self.drives.yy));
+        let across = |z: Complex<T>| at(z.re, common);
+        let drives = Matrix { xy: across(self.drives.xy), yx: across(self.drives.yx), ..self.drives };
+        Self::of(self.known, self.y_of_y, y_of_x, drives)
+    }
+
+    /// An offset, the cubic, or a number of the mechanics in force, in the parameter's unit; 0 of one that stands in the
+    /// matrices.
+    pub fn known(&self, p: Parameter) -> T {
+        get(&self.known, p)
+    }
+
+    /// What the drives make of commands, seen through the compensated readout.
+    pub fn drives(&self) -> &Matrix<T> {
+        &self.drives
+    }
+
     /// γ in force.
     pub fn detection_ratio(&self) -> T {
         self.y_of_y.squared_norm().sqrt() - T::one()

@@ -50,7 +50,7 @@ impl<T: Float> Calibrator<T> {
 
     //= specs/self-calibration.md#held
     //# Nothing MUST be learned from a disturbed instrument.
-    fn close(&self, s: &mut State<T>) {
+    pub(crate) fn close(&self, s: &mut State<T>) {
         match s.closed.close(self.control_s) {
             Some(sample) => {
                 s.sample = sample;
@@ -65,7 +65,7 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
-    fn direct(&self, s: &mut State<T>) {
+    pub(crate) fn direct(&self, s: &mut State<T>) {
         s.closed.direct(&mut s.sample);
         s.schedule.turn =
             if s.before.whole { half_turns(pick(&s.sample.y, 1) - pick(&s.before.y, 1)) } else { T::zero() };
@@ -253,13 +253,23 @@ impl<T: Float> Calibrator<T> {
 
     /// Whether the instrument turns: what nothing explains of the angle, against how well the precession is known.
     pub(crate) fn detect(&self, s: &mut State<T>) {
+        let limit = self.doubtful(s);
+        self.notice(s, limit);
+    }
+
+    /// What forces and mechanics, as well as they are known, may leave of the rate unexplained, rad/s.
+    pub(crate) fn doubtful(&self, s: &State<T>) -> T {
+        let doubt = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
+        T::from_f64(0.02)
+            + T::from_f64(2.5) * doubt(Parameter::ForceScale) * s.sample.push.aside.magnitude()
+            + T::two() * doubt(Parameter::Rate)
+    }
+
+    /// The instrument turns where more than `limit` is unexplained, and for two seconds after.
+    pub(crate) fn notice(&self, s: &mut State<T>, limit: T) {
         let sc = &mut s.schedule;
         sc.rate = sc.turn * self.cycles_per_s;
         sc.unexplained = sc.unexplained + T::ratio(1, 5) * (sc.rate - sc.unexplained);
-        let doubt = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
-        let limit = T::from_f64(0.02)
-            + T::from_f64(2.5) * doubt(Parameter::ForceScale) * s.sample.push.aside.magnitude()
-            + T::two() * doubt(Parameter::Rate);
         if !sc.unexplained.within(limit) {
             if sc.moving == 0 {
                 // what turned before it was noticed isn't in the integrals

@@ -11,6 +11,7 @@ pub mod parameters;
 pub mod proofs;
 pub mod record;
 mod regressors;
+pub mod replay;
 mod schedule;
 mod state;
 pub mod status;
@@ -132,6 +133,14 @@ impl<T: Float> Calibrator<T> {
     /// # Errors
     /// A setting outside its domain.
     pub fn new(s: &Settings) -> Result<Self, ConfigError> {
+        if s.steps < cycle::SLICES {
+            return Err(ConfigError { parameter: "steps", expected: "at least 80" });
+        }
+        Self::of_cycles(s)
+    }
+
+    /// A calibrator whose cycles are of any length in control steps: whoever uses it does a cycle's work at once.
+    fn of_cycles(s: &Settings) -> Result<Self, ConfigError> {
         let positive = |value: f64, parameter| {
             if value > 0.0 && value.is_finite() {
                 Ok(T::from_f64(value))
@@ -139,9 +148,6 @@ impl<T: Float> Calibrator<T> {
                 Err(ConfigError { parameter, expected: "finite and positive" })
             }
         };
-        if s.steps < cycle::SLICES {
-            return Err(ConfigError { parameter: "steps", expected: "at least 80" });
-        }
         let cycle = s.control_s * f64::from(s.steps);
         if !(0.01..=0.1).contains(&cycle) {
             return Err(ConfigError { parameter: "steps", expected: "a cycle of 10 to 100 ms" });

@@ -9,7 +9,7 @@
 //! Ratio and skew of the detection, and its phase, have no part here: at rest they can't be told from the drives. What
 //! excites them is the turn that no force explains ([`turned`]).
 
-use cvg_model::Float;
+use cvg_model::{Float, Pendulum};
 
 use crate::parameters::{N, Parameter, Vector, get, set};
 use crate::window::{Push, Sample};
@@ -150,6 +150,32 @@ pub(crate) fn known_rates<T: Float>(p: &Push<T>, r: T, (c2, s2): (T, T), known: 
         p.along + r * p.quadrature - k(Parameter::Damping) - dc * c2 - ds * s2,
         p.aside + dc * s2 - ds * c2 + (kc * c2 + ks * s2) * r + k(Parameter::Rate),
         p.quadrature - T::half() * (kc * s2 - ks * c2) + k(Parameter::QuadratureRate) - r * p.along,
+    ]
+}
+
+/// [`known_rates`] of any orbit, however far from a line: with ε its ellipticity, of an amplitude √E,
+///
+/// $$\frac{d}{dt}\tfrac12\ln E = f_u\cos\varepsilon + g_n\sin\varepsilon - \tfrac1\tau - d_2\cos 2\varepsilon + q_0\sin 2\varepsilon,\quad
+///   \dot\theta = \frac{f_n\cos\varepsilon + g_u\sin\varepsilon - d_3}{\cos 2\varepsilon} + \chi r + b,\quad
+///   \dot\varepsilon = g_n\cos\varepsilon - f_u\sin\varepsilon + d_2\sin 2\varepsilon + \tfrac12\kappa_3 + q_0\cos 2\varepsilon$$
+///
+/// with (d_2, d_3) and (χ, κ_3) the anisotropies along the orbit: d_2 = d_c c_2 + d_s s_2, d_3 = d_s c_2 − d_c s_2.
+#[inline]
+pub(crate) fn exact_rates<T: Float>(push: &Push<T>, p: &Pendulum<T>, (c2, s2): (T, T), known: &Vector<T>) -> [T; 3] {
+    let k = |p| get(known, p);
+    let f = push.over(T::one() / p.e.sqrt());
+    let sin_2e = p.q / p.e;
+    let cos_2e = (T::one() - sin_2e * sin_2e).sqrt();
+    let cos = (T::half() * (T::one() + cos_2e)).sqrt();
+    let sin = T::half() * sin_2e / cos;
+    let along = |c, s| (k(c) * c2 + k(s) * s2, k(s) * c2 - k(c) * s2);
+    let (d2, d3) = along(Parameter::AnisodampingCos, Parameter::AnisodampingSin);
+    let (chi, k3) = along(Parameter::SplitCos, Parameter::SplitSin);
+    let (half, q0) = (T::half(), k(Parameter::QuadratureRate));
+    [
+        f.along * cos + f.quadrature * sin - k(Parameter::Damping) - d2 * cos_2e + q0 * sin_2e,
+        (f.aside * cos + f.across * sin - d3 + half * chi * sin_2e) / cos_2e + k(Parameter::Rate),
+        f.quadrature * cos - f.along * sin + d2 * sin_2e + half * k3 + q0 * cos_2e,
     ]
 }
 

@@ -5,7 +5,7 @@
 use cvg_model::{Float, Pendulum};
 
 use crate::parameters::Vector;
-use crate::regressors::known_rates;
+use crate::regressors::{exact_rates, known_rates};
 
 /// Sums of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +74,39 @@ impl<T: Float> Sums<T> {
     /// mechanics in force.
     #[inline]
     pub(crate) fn add(&mut self, p: &Pendulum<T>, now: (T, T), before: (T, T), push: &Push<T>, known: &Vector<T>) {
+        self.take(p, now, before, push, T::one(), |push, twice| {
+            // 1/a of a vibration that the energy loop holds
+            let h = T::half() * (p.e - T::one());
+            let per_a = T::one() - h + T::ratio(3, 2) * h * h;
+            known_rates(&push.over(per_a), T::half() * p.q * per_a * per_a, twice, known)
+        });
+    }
+
+    /// [`Sums::add`] of a vibration that no loop need hold, on an orbit that no loop need flatten, where forces are held for
+    /// the share `held` of a step.
+    #[inline]
+    pub(crate) fn add_exactly(
+        &mut self,
+        p: &Pendulum<T>,
+        now: (T, T),
+        before: (T, T),
+        push: &Push<T>,
+        held: T,
+        known: &Vector<T>,
+    ) {
+        self.take(p, now, before, push, held, |push, twice| exact_rates(push, p, twice, known));
+    }
+
+    #[inline]
+    fn take(
+        &mut self,
+        p: &Pendulum<T>,
+        now: (T, T),
+        before: (T, T),
+        push: &Push<T>,
+        held: T,
+        rates: impl FnOnce(&Push<T>, (T, T)) -> [T; 3],
+    ) {
         // sine of the turn since the step before: far below a radian
         let x = now.1 * before.0 - now.0 * before.1;
         if self.count == T::zero() {
@@ -86,17 +119,14 @@ impl<T: Float> Sums<T> {
         let excess = p.e - T::one();
         self.energy = self.energy + excess;
         self.quadrature = self.quadrature + p.q;
-        let push = push.held(T::half() * x);
+        let push = push.held(T::half() * held * x);
         for (sum, push) in self.push.iter_mut().zip([push.along, push.aside, push.quadrature, push.across]) {
             *sum = *sum + push;
         }
-        // 1/a of a vibration that the energy loop holds
-        let h = T::half() * excess;
-        let per_a = T::one() - h + T::ratio(3, 2) * h * h;
         // the mechanics at the middle of the step
         let (cos_2, sin_2) = (now.0 * now.0 - now.1 * now.1, T::two() * now.0 * now.1);
         let (cos_2, sin_2) = (cos_2 - x * sin_2, sin_2 + x * cos_2);
-        let rates = known_rates(&push.over(per_a), T::half() * p.q * per_a * per_a, (cos_2, sin_2), known);
+        let rates = rates(&push, (cos_2, sin_2));
         for ((sum, ramp), rate) in self.rate.iter_mut().zip(self.ramp.iter_mut()).zip(rates) {
             *sum = *sum + rate;
             *ramp = *ramp + rate * self.count;

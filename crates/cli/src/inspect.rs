@@ -172,6 +172,7 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
         RunKind::Ringdown { .. } => ", a ring-down",
         RunKind::Static => ", at rest",
         RunKind::Decay => ", a free decay",
+        RunKind::Virtual => ", virtual precession",
     });
     line(format!("{}{kind}", recording.source.display()));
     line(format!(

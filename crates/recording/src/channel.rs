@@ -27,6 +27,8 @@ pub enum Channel {
     Vas,
     /// `vqc_v`: output of the quadrature controller, V.
     Vqc,
+    /// `virtual_dps`: precession that the instrument's own forces are commanded to make, deg/s of the pattern.
+    Virtual,
     /// `temp_c`: temperature, °C.
     Temperature,
     /// `x_v`: displacement of X itself, carrier and all, in any unit.
@@ -41,7 +43,7 @@ pub enum Channel {
 
 impl Channel {
     /// All channels, in the order in which a recording is written that was not read from a file.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Time,
         Self::Rate,
         Self::Table,
@@ -52,6 +54,7 @@ impl Channel {
         Self::Theta,
         Self::Vas,
         Self::Vqc,
+        Self::Virtual,
         Self::Temperature,
         Self::X,
         Self::Y,
@@ -73,6 +76,7 @@ impl Channel {
             Self::Theta => "theta_deg",
             Self::Vas => "vas_v",
             Self::Vqc => "vqc_v",
+            Self::Virtual => "virtual_dps",
             Self::Temperature => "temp_c",
             Self::X => "x_v",
             Self::Y => "y_v",
@@ -95,7 +99,7 @@ impl Channel {
     /// forces and temperature: there a missing cell is NaN.
     #[must_use]
     pub const fn is_needed_in_every_row(self) -> bool {
-        !matches!(self, Self::Vas | Self::Vqc | Self::Temperature | Self::Fx | Self::Fy)
+        !matches!(self, Self::Vas | Self::Vqc | Self::Virtual | Self::Temperature | Self::Fx | Self::Fy)
     }
 }
 

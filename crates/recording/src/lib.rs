@@ -43,7 +43,7 @@ pub use unknown::{Cells, UnknownColumn};
 /// One recording: columns of equal length, one value a row.
 ///
 /// As read, `t_s` is strictly increasing, and `t_s`, `rate_dps`, `table_deg`, `xc_v`, `xs_v`, `yc_v`, `ys_v`,
-/// `theta_deg`, `x_v` and `y_v` are finite wherever they are there; `vas_v`, `vqc_v`, `temp_c`, `fx_v` and `fy_v` are NaN
+/// `theta_deg`, `x_v` and `y_v` are finite wherever they are there; `vas_v`, `vqc_v`, `virtual_dps`, `temp_c`, `fx_v` and `fy_v` are NaN
 /// where the file has no number.
 /// Angles are wrapped as in the file.
 #[derive(Debug, Clone, Default)]
@@ -72,6 +72,8 @@ pub struct Recording {
     pub vas_v: Option<Vec<f64>>,
     /// Output of the quadrature controller, V.
     pub vqc_v: Option<Vec<f64>>,
+    /// Precession that the instrument's own forces were commanded to make, deg/s of the pattern.
+    pub virtual_dps: Option<Vec<f64>>,
     /// Temperature, °C.
     pub temp_c: Option<Vec<f64>>,
     /// Displacement of X itself, at several points a period of the carrier, in any unit.
@@ -112,6 +114,7 @@ impl Recording {
             Channel::Theta => &self.theta_deg,
             Channel::Vas => &self.vas_v,
             Channel::Vqc => &self.vqc_v,
+            Channel::Virtual => &self.virtual_dps,
             Channel::Temperature => &self.temp_c,
             Channel::X => &self.x_v,
             Channel::Y => &self.y_v,
@@ -137,6 +140,7 @@ impl Recording {
             Channel::Theta => &mut self.theta_deg,
             Channel::Vas => &mut self.vas_v,
             Channel::Vqc => &mut self.vqc_v,
+            Channel::Virtual => &mut self.virtual_dps,
             Channel::Temperature => &mut self.temp_c,
             Channel::X => &mut self.x_v,
             Channel::Y => &mut self.y_v,

@@ -13,6 +13,8 @@ const ROTATION: &str =
 const CHANNELS: &str = "`t_s`, `xc_v` and `yc_v`";
 const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`";
 const DECAY: &str = "`t_s` and one of (`xc_v` with `xs_v`, `yc_v` and `ys_v`; `x_v` with `y_v`)";
+const VIRTUAL: &str =
+    "`t_s`, `xc_v`, `xs_v`, `yc_v`, `ys_v`, `vas_v` and `vqc_v`, and `virtual_dps` where there was any";
 
 /// Whether a set of channels holds the time and an angle: the least that makes a recording.
 pub(super) fn holds_an_angle(has: impl Fn(Channel) -> bool) -> bool {
@@ -69,6 +71,17 @@ impl Recording {
         let all = |channels: &[Channel]| channels.iter().all(|channel| self.channel(*channel).is_some());
         let whole = all(&[Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys]) || all(&[Channel::X, Channel::Y]);
         self.require(whole, "a free decay", DECAY)
+    }
+
+    /// Whether the columns of a run of virtual precession or of unknown rotation are there: `t_s`, `xc_v`, `xs_v`, `yc_v`,
+    /// `ys_v`, `vas_v`, `vqc_v`. Without `virtual_dps` nothing was commanded.
+    ///
+    /// # Errors
+    /// [`ReadError::MissingColumns`] says what is needed and what is there.
+    pub fn require_virtual(&self) -> Result<(), ReadError> {
+        let needed = [Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys, Channel::Vas, Channel::Vqc];
+        let whole = needed.iter().all(|channel| self.channel(*channel).is_some());
+        self.require(whole, "virtual precession", VIRTUAL)
     }
 
     fn require(&self, whole: bool, needed_for: &'static str, needed: &'static str) -> Result<(), ReadError> {

@@ -37,7 +37,7 @@ pub(crate) fn conversion(channel: Channel, unit: &str) -> Option<Conversion> {
     match channel {
         Channel::Time => time_s(&unit).map(Conversion::by),
         Channel::Table | Channel::Theta => angle_deg(&unit).map(Conversion::by),
-        Channel::Rate => rate_dps(&unit).map(Conversion::by),
+        Channel::Rate | Channel::Virtual => rate_dps(&unit).map(Conversion::by),
         Channel::Temperature => match unit.as_str() {
             "°c" | "c" | "degc" | "celsius" => Some(Conversion::NONE),
             "k" | "kelvin" => Some(Conversion { factor: 1.0, offset: -ICE_K }),
@@ -54,7 +54,7 @@ pub(crate) const fn of_channel(channel: Channel) -> &'static str {
     match channel {
         Channel::Time => "s",
         Channel::Table | Channel::Theta => "deg",
-        Channel::Rate => "deg/s",
+        Channel::Rate | Channel::Virtual => "deg/s",
         Channel::Temperature => "°C",
         Channel::X | Channel::Y => "any unit",
         _ => "V",

@@ -12,6 +12,7 @@ use std::{fs, io};
 use cvg_model::effects::EffectId;
 use serde::Serialize;
 
+use crate::closed_loop::ClosedLoop;
 use crate::scenario::{EffectSetting, Instrument, Purpose, Reference, Run, Scenario, Settings};
 
 /// One column of a recording.
@@ -69,7 +70,7 @@ impl SimulatedRun {
                 let value = column.values.get(row).copied().unwrap_or(f64::NAN);
                 let separator = if i == 0 { "" } else { "," };
                 // writing to a string does not fail
-                let _ = if column.name == "rate_dps" {
+                let _ = if matches!(column.name, "rate_dps" | "virtual_dps") {
                     write!(text, "{separator}{value}")
                 } else {
                     write!(text, "{separator}{value:.decimals$}")
@@ -142,6 +143,7 @@ impl Simulated {
     /// The campaign's description.
     pub fn campaign_toml(&self) -> String {
         let s = &self.settings;
+        let bench = s.runs.iter().any(|r| matches!(r, Run::Virtual { .. }));
         let campaign = Campaign {
             device: &s.device,
             instrument: s.instrument,
@@ -149,6 +151,8 @@ impl Simulated {
             angular_gain: s.angular_gain_stated,
             period_deg: (s.instrument == Instrument::Sensor).then_some(360.0),
             temperature_c: s.temperature.map(|t| t.reference_c),
+            drive_per_s_v: bench.then_some(s.drive_per_s_v),
+            control_hz: bench.then_some(s.control_hz),
         };
         let runs = s.runs.iter().map(CampaignRun::of).collect();
         serialised(&CampaignFile { campaign, run: runs })
@@ -205,6 +209,10 @@ struct Campaign<'a> {
     period_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature_c: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drive_per_s_v: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control_hz: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -222,6 +230,12 @@ enum CampaignRun<'a> {
         angle_deg: f64,
         energy_off_s: f64,
     },
+    Virtual {
+        file: &'a str,
+        settle_s: f64,
+        #[serde(rename = "use")]
+        purpose: Purpose,
+    },
 }
 
 impl<'a> CampaignRun<'a> {
@@ -233,6 +247,9 @@ impl<'a> CampaignRun<'a> {
             Run::Ringdown { file, angle_deg, energy_off_s, .. } => {
                 Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s }
             }
+            Run::Virtual { file, settle_s, purpose, .. } => {
+                Self::Virtual { file, settle_s: *settle_s, purpose: *purpose }
+            }
         }
     }
 }
@@ -242,10 +259,13 @@ fn record(scenario: &Scenario, index: usize, run: &Run) -> Vec<Column> {
     let (count, every) = (scenario.control_samples(run), scenario.control_samples_per_row());
     let mut rows = Rows::default();
     if let Some(mut closed) = scenario.closed_loop(index) {
+        let mut bench = Bench::of(run, scenario.settings().control_hz);
         for k in 0..count {
             let table_rad = closed.table_rad();
+            let virtual_dps = bench.as_mut().map_or(0.0, |b| b.turn(&mut closed, k));
             closed.step();
             if k % every == 0 {
+                rows.virtual_dps.push(virtual_dps);
                 let seen = closed.seen();
                 let z = &seen.readout;
                 rows.t_s.push(seen.t_s);
@@ -273,6 +293,43 @@ fn record(scenario: &Scenario, index: usize, run: &Run) -> Vec<Column> {
     rows.columns(scenario.settings(), index, run)
 }
 
+/// What is done to an instrument without a table.
+struct Bench<'a> {
+    virtual_dps: f64,
+    reversal_s: f64,
+    turned: &'a [[f64; 2]],
+    control_hz: f64,
+}
+
+impl<'a> Bench<'a> {
+    fn of(run: &'a Run, control_hz: f64) -> Option<Self> {
+        let Run::Virtual { virtual_dps, reversal_s, turned, .. } = run else { return None };
+        Some(Self { virtual_dps: *virtual_dps, reversal_s: *reversal_s, turned, control_hz })
+    }
+
+    /// Turns the pattern, and the instrument, at control sample `k`; gives the precession that is commanded, deg/s.
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "samples of a run"
+    )]
+    fn turn(&mut self, closed: &mut ClosedLoop, k: u64) -> f64 {
+        let t = k as f64 / self.control_hz;
+        if let [[from_s, rate_dps], later @ ..] = self.turned
+            && t >= *from_s
+        {
+            closed.turn_at(rate_dps.to_radians());
+            self.turned = later;
+        }
+        let leg = (t / self.reversal_s) as u64;
+        let speed = if (leg / 2).is_multiple_of(2) { self.virtual_dps } else { 0.5 * self.virtual_dps };
+        let virtual_dps = if leg.is_multiple_of(2) { speed } else { -speed };
+        closed.precess_at(virtual_dps.to_radians());
+        virtual_dps
+    }
+}
+
 /// A recording while it grows.
 #[derive(Default)]
 struct Rows {
@@ -282,14 +339,17 @@ struct Rows {
     theta_deg: Vec<f64>,
     /// xc, xs, yc, ys, vas, vqc
     channels: [Vec<f64>; 6],
+    virtual_dps: Vec<f64>,
 }
 
 impl Rows {
     fn columns(self, s: &Settings, index: usize, run: &Run) -> Vec<Column> {
         let reference = match run {
             Run::Rotation { reference, .. } => *reference,
-            Run::Ringdown { .. } => Reference::Rate,
+            Run::Ringdown { .. } | Run::Virtual { .. } => Reference::Rate,
         };
+        // nobody records what turns an instrument without a table
+        let bench = matches!(run, Run::Virtual { .. });
         let sensor = s.instrument == Instrument::Sensor;
         let temperature =
             s.temperature.map(|t| self.t_s.iter().map(|time| t.start_of(index) + t.drift_k_per_s * time).collect());
@@ -297,14 +357,15 @@ impl Rows {
         let [x_c, x_s, y_c, y_s, v_as, v_qc] = self.channels;
         let candidates = [
             ("t_s", true, self.t_s),
-            ("rate_dps", reference != Reference::Table, commanded),
-            ("table_deg", reference != Reference::Rate, self.table_deg),
+            ("rate_dps", reference != Reference::Table && !bench, commanded),
+            ("table_deg", reference != Reference::Rate && !bench, self.table_deg),
             ("xc_v", true, x_c),
             ("xs_v", !sensor, x_s),
             ("yc_v", true, y_c),
             ("ys_v", !sensor, y_s),
             ("vas_v", !sensor, v_as),
             ("vqc_v", !sensor, v_qc),
+            ("virtual_dps", bench, self.virtual_dps),
             ("theta_deg", s.theta_deg, self.theta_deg),
             ("temp_c", temperature.is_some(), temperature.unwrap_or_default()),
         ];

@@ -116,6 +116,8 @@ pub struct ClosedLoop {
     force_noise: Option<Noise>,
     wander: Wander,
     learner: Option<Learner>,
+    /// command that precesses the pattern, V
+    precessing_v: f64,
     // state
     sample: u64,
     /// samples since t = 0
@@ -199,6 +201,7 @@ impl ClosedLoop {
             force_noise: (design.force_noise_v > 0.0).then_some(force_noise),
             wander,
             learner: None,
+            precessing_v: 0.0,
             sample: 0,
             tick: 0_i64.saturating_sub_unsigned(course.warm_up_samples),
             table_rad: 0.0,
@@ -229,6 +232,11 @@ impl ClosedLoop {
         if let Some(learner) = &mut self.learner {
             learner.learning = learning;
         }
+    }
+
+    /// The electronics precess the pattern by a force of this size from the next sample on, rad/s at the set amplitude.
+    pub fn precess_at(&mut self, rate_rad_s: f64) {
+        self.precessing_v = -rate_rad_s * self.energy_set_v2.sqrt() / self.design.drive_per_s_v;
     }
 
     /// The table turns at another rate from the next sample on, rad/s.
@@ -293,7 +301,7 @@ impl ClosedLoop {
         let v_qc = self.design.quadrature.quadrature(&mut self.quadrature_state, pendulum.q).volts;
         let v_qs = match &self.hold {
             Some(target) => self.design.rate.step(&mut self.rate_state, &pendulum, target).volts,
-            None => 0.0,
+            None => self.precessing_v,
         };
         let correction_rad_s = self.design.phase.step(&mut self.lock_state, &pendulum).rad_s;
         let mut commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: 0.0 };

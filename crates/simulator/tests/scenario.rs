@@ -32,6 +32,7 @@ fn the_papers_scenario_has_the_runs_that_its_method_needs() {
         .map(|run| match run {
             Run::Rotation { rate_dps, amplitude, purpose, .. } => (*rate_dps, *amplitude, *purpose == Purpose::Fit),
             Run::Ringdown { angle_deg, .. } => (*angle_deg, 0.0, true),
+            Run::Virtual { .. } => unreachable!("the paper has a table"),
         })
         .collect();
     assert_eq!(

@@ -3,7 +3,48 @@
 
 use serde::Serialize;
 
-use crate::report::{Allan, EffectReport, Estimate, Input, RunReport, SCHEMA, Status, Temperature, Tool, Unexplained};
+use crate::report::{
+    Allan, EffectReport, Estimate, Input, ParameterReport, RunReport, SCHEMA, Status, Temperature, Tool, Unexplained,
+};
+
+/// What virtual precession at rest and rotation that nobody recorded tell of a gyroscope.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VirtualPrecession {
+    /// time at rest with the angle in use, and time turning, s
+    pub seconds: [f64; 2],
+    /// ratio, skew and phase of the detection are told: rotation, or a split of two orientations, tells them from the drives
+    pub detection_known: bool,
+    /// standard deviation of the angle-dependent bias that ratio and skew may still make, deg
+    pub bias_deg: f64,
+    /// numbers beside those of effects; an interval is null where none could be shown to hold
+    pub parameters: Vec<ParameterReport>,
+    /// what is not told, and which run would tell it
+    pub not_told: Vec<NotTold>,
+    /// what is left of rows that nothing was fitted to
+    pub heldout: Vec<Innovation>,
+}
+
+/// Something that a campaign does not tell.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NotTold {
+    /// what
+    pub what: String,
+    /// the run that would tell it
+    pub separated_by: String,
+}
+
+/// What of one channel was not predicted, a cycle's, on rows that nothing was fitted to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Innovation {
+    /// amplitude, angle or ellipticity
+    pub channel: String,
+    /// root mean square, rad (of the amplitude: relative)
+    pub rms_rad: f64,
+    /// the part of it that is white
+    pub noise_rad: f64,
+    /// cycles
+    pub cycles: usize,
+}
 
 /// How constant a radius is that a sensor holds, as shares of its mean, on rows that nothing was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -58,7 +99,7 @@ pub struct Survey {
     pub angular_gain: Option<Estimate>,
     /// G_Dy/G_Dx
     pub detection_gain_ratio: Option<Estimate>,
-    /// null: nothing was driven
+    /// G_Ax/G_Ay; null where nothing tells it
     pub actuation_gain_ratio: Option<Estimate>,
     /// identified effects
     pub effects: Vec<EffectReport>,
@@ -76,6 +117,8 @@ pub struct Survey {
     decomposition: [(); 0],
     proposals: [(); 0],
     scale_factor: Option<()>,
+    /// what virtual precession and unknown rotation told; null without such runs
+    pub virtual_precession: Option<VirtualPrecession>,
     /// how far the angle wanders at rest; null without a run at rest
     pub allan: Option<Allan>,
     /// how bias and readout go with the temperature; null without two runs with one
@@ -109,6 +152,7 @@ impl Survey {
             decomposition: [],
             proposals: [],
             scale_factor: None,
+            virtual_precession: None,
             allan: None,
             temperature: None,
             warnings: Vec::new(),

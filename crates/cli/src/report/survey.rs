@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cvg_calibration::Surveyed;
-use cvg_calibration::report::survey::Survey;
+use cvg_calibration::report::survey::{Survey, VirtualPrecession};
 use cvg_calibration::report::{Allan, Estimate};
 use serde_json::json;
 
@@ -32,6 +32,7 @@ pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     h.push_str("</header><main>");
     parameters(&mut h, r);
     effects(&mut h, r);
+    without_a_table(&mut h, r);
     draw(&mut h, "<p>The figures need scripts, which this file brings along.</p>", &figures);
     runs(&mut h, &r.runs);
     temperature(&mut h, r.temperature.as_ref());
@@ -55,6 +56,10 @@ fn headline(h: &mut String, r: &Survey) {
             times(radius.before.rms, radius.after.rms)
         );
     }
+    if let Some(v) = &r.virtual_precession {
+        let _ = write!(h, "<p class=\"headline\">{}</p>", escape(&headline_without_a_table(v)));
+        let _ = write!(h, "<p class=\"finding\">{}</p>", escape(&seconds_in_words(v)));
+    }
     if let Some(allan) = &r.allan {
         let _ = write!(h, "<p class=\"finding\">At rest:{}.</p>", escape(&allan_in_words(allan).join(";")));
     }
@@ -70,11 +75,24 @@ fn parameters(h: &mut String, r: &Survey) {
             }
         };
         estimate("detection gain ratio G<sub>Dy</sub>/G<sub>Dx</sub>", r.detection_gain_ratio.as_ref(), "1");
+        estimate("actuation gain ratio G<sub>Ax</sub>/G<sub>Ay</sub>", r.actuation_gain_ratio.as_ref(), "1");
         if let Some(a) = &r.allan {
             estimate("angle random walk", a.angle_random_walk_deg_sqrt_h.as_ref(), "deg/√h");
             estimate("bias instability", Some(&a.bias_instability_dph), "deg/h");
         }
-        let once = |name: &str| name != "detection_gain_ratio" || r.detection_gain_ratio.is_none();
+        for p in r.virtual_precession.iter().flat_map(|v| &v.parameters) {
+            let ends = p.ci95.map(|c| interval(p.value, c));
+            let (value, ends) = ends
+                .map_or((significant(p.value), "not shown to hold".to_owned()), |[v, low, high]| {
+                    (v, format!("{low} … {high}"))
+                });
+            row(h, &[&escape(&p.name), &value, &ends, &escape(&p.unit)]);
+        }
+        let once = |name: &str| match name {
+            "detection_gain_ratio" => r.detection_gain_ratio.is_none(),
+            "actuation_gain_ratio" => r.actuation_gain_ratio.is_none(),
+            _ => true,
+        };
         let all = r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p)));
         for (e, p) in all.filter(|(_, p)| once(&p.name)) {
             let name = format!("{}: {}", escape(&e.id), escape(&p.name));
@@ -97,6 +115,38 @@ fn effects(h: &mut String, r: &Survey) {
             let _ = write!(h, "<tr><td>{}</td><td class=\"why\">{}</td></tr>", escape(&e.id), escape(&e.evidence));
         }
     });
+}
+
+/// What the filter left unpredicted, and what nothing told.
+fn without_a_table(h: &mut String, r: &Survey) {
+    let Some(v) = &r.virtual_precession else { return };
+    h.push_str("<h2 id=\"not-told\">What is not told</h2>");
+    table(h, "and which run would tell it", &["what", "separated by"], |h| {
+        for n in &v.not_told {
+            row(h, &[&escape(&n.what), &escape(&n.separated_by)]);
+        }
+    });
+    h.push_str("<h2 id=\"innovations\">What was not predicted</h2>");
+    let heads = ["channel", "rms [rad]", "of it white [rad]", "cycles"];
+    table(h, "Rows that nothing was fitted to", &heads, |h| {
+        for i in &v.heldout {
+            let [rms, noise] = [i.rms_rad, i.noise_rad].map(|v| format!("{v:.1e}"));
+            row(h, &[&escape(&i.channel), &rms, &noise, &i.cycles.to_string()]);
+        }
+    });
+}
+
+fn headline_without_a_table(v: &VirtualPrecession) -> String {
+    if v.detection_known {
+        format!("Told without a table: the detection may still make {} of bias, rms", degrees(v.bias_deg))
+    } else {
+        "Detection and actuation are not told apart".to_owned()
+    }
+}
+
+fn seconds_in_words(v: &VirtualPrecession) -> String {
+    let [rest, turning] = v.seconds;
+    format!("{rest:.0} s of precession at rest, {turning:.0} s turning")
 }
 
 fn files(h: &mut String, r: &Survey) {
@@ -159,6 +209,16 @@ pub(crate) fn summary(r: &Survey) -> String {
         ));
         if let Some(d) = radius.correction_rms_deg {
             line(format!("  which changes the angle by  {d:.5}° rms"));
+        }
+    }
+    if let Some(v) = &r.virtual_precession {
+        line(format!("  {}", headline_without_a_table(v)));
+        line(format!("  {}", seconds_in_words(v)));
+        for p in &v.parameters {
+            line(format!("  {:<26} {} {}", p.name, significant(p.value), if p.unit == "1" { "" } else { &p.unit }));
+        }
+        for n in &v.not_told {
+            line(format!("  not told: {}; {} would", n.what, n.separated_by));
         }
     }
     for e in &r.effects {

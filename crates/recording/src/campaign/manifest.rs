@@ -47,6 +47,8 @@ pub(super) struct Manifest {
     pub(super) reference: Option<Reference>,
     pub(super) pole_pairs: Option<f64>,
     pub(super) temperature_c: Option<f64>,
+    pub(super) drive_per_s_v: Option<f64>,
+    pub(super) control_hz: Option<f64>,
     /// What the recordings call their columns.
     pub(super) naming: Naming,
     pub(super) runs: Vec<Entry>,
@@ -60,6 +62,7 @@ enum Kind {
     Ringdown,
     Static,
     Decay,
+    Virtual,
 }
 
 /// A refusal of a ring-down where there are no mechanics.
@@ -88,11 +91,22 @@ pub(super) fn refuse(path: &Path, at: Position, what: String, wanted: String) ->
     ReadError::Campaign { path: path.to_path_buf(), line: at.line, column: at.column, what, wanted }
 }
 
-const CAMPAIGN_KEYS: &[&str] =
-    &["device", "instrument", "carrier_hz", "angular_gain", "period_deg", "reference", "pole_pairs", "temperature_c"];
+const CAMPAIGN_KEYS: &[&str] = &[
+    "device",
+    "instrument",
+    "carrier_hz",
+    "angular_gain",
+    "period_deg",
+    "reference",
+    "pole_pairs",
+    "temperature_c",
+    "drive_per_s_v",
+    "control_hz",
+];
 const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
 const STATIC_KEYS: &[&str] = &["kind", "file", "settle_s"];
 const DECAY_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
+const VIRTUAL_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude"];
 const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
 
 /// No temperature is below, °C.
@@ -165,6 +179,9 @@ impl Text<'_> {
         let pole_pairs = self.number(head, "pole_pairs", "a whole number from 1 on", is_count)?;
         let temperature_c =
             self.number(head, "temperature_c", "a temperature in °C", |value| value > ABSOLUTE_ZERO_C)?;
+        let drive_per_s_v =
+            self.number(head, "drive_per_s_v", "a positive number of V/s per V", |value| value > 0.0)?;
+        let control_hz = self.number(head, "control_hz", "a positive number of Hz", |value| value > 0.0)?;
         let naming = self.columns(document)?;
         let runs = self.runs(document, instrument)?;
         Ok(Manifest {
@@ -176,6 +193,8 @@ impl Text<'_> {
             reference,
             pole_pairs,
             temperature_c,
+            drive_per_s_v,
+            control_hz,
             naming,
             runs,
             warnings,
@@ -219,12 +238,21 @@ impl Text<'_> {
             return Ok(entries);
         }
         let is_decay = |entry: &Entry| entry.kind == RunKind::Decay;
-        if !entries.iter().any(|entry| is_rotation(entry) || is_decay(entry)) {
+        let is_virtual = |entry: &Entry| entry.kind == RunKind::Virtual;
+        if let Some(entry) = entries.iter().find(|entry| is_virtual(entry))
+            && !entries.iter().all(is_virtual)
+        {
+            let what = "a run of virtual precession beside runs of another kind".to_owned();
+            let wanted = "a campaign of its own: it needs no reference, and is not identified against one".to_owned();
+            return Err(refuse(self.path, entry.at, what, wanted));
+        }
+        if !entries.iter().any(|entry| is_rotation(entry) || is_decay(entry) || is_virtual(entry)) {
             return Err(self.refuse(runs.span(), "no run is a rotation", WANTED));
         }
-        for (kind, is_kind) in [("rotation", &is_rotation as &dyn Fn(&Entry) -> bool), ("decay", &is_decay)] {
-            let mut alike = entries.iter().filter(|entry| is_kind(entry)).peekable();
+        for kind in [RunKind::Rotation, RunKind::Decay, RunKind::Virtual] {
+            let mut alike = entries.iter().filter(|entry| entry.kind == kind).peekable();
             if alike.peek().is_some() && alike.all(|entry| entry.role == Role::Holdout) {
+                let kind = kind.name();
                 let what = format!("every {kind} run has `use = \"holdout\"`, so that nothing is left to fit");
                 return Err(self.refuse(runs.span(), what, format!("a {kind} run with `use = \"fit\"`, the default")));
             }
@@ -238,12 +266,13 @@ impl Text<'_> {
             ("ringdown", Kind::Ringdown),
             ("static", Kind::Static),
             ("decay", Kind::Decay),
+            ("virtual", Kind::Virtual),
         ];
         let Some(kind) = self.choice(table, "kind", &kinds)? else {
-            let wanted = "`kind = \"rotation\"`, `kind = \"ringdown\"`, `kind = \"static\"` or `kind = \"decay\"`";
+            let wanted = "`kind = \"rotation\"`, \"ringdown\", \"static\", \"decay\" or \"virtual\"";
             return Err(self.refuse(span, "this run has no `kind`", wanted));
         };
-        if matches!(kind, Kind::Ringdown | Kind::Decay) && instrument == Instrument::Sensor {
+        if matches!(kind, Kind::Ringdown | Kind::Decay | Kind::Virtual) && instrument == Instrument::Sensor {
             return Err(ringdown_of_a_sensor(self.path, self.position(&span)));
         }
         let (keys, place) = match kind {
@@ -251,6 +280,7 @@ impl Text<'_> {
             Kind::Ringdown => (RINGDOWN_KEYS, "in a ring-down"),
             Kind::Static => (STATIC_KEYS, "in a run at rest"),
             Kind::Decay => (DECAY_KEYS, "in a free decay"),
+            Kind::Virtual => (VIRTUAL_KEYS, "in a run of virtual precession"),
         };
         self.refuse_unknown(table, keys, place)?;
         let Some(file) = get(table, "file") else {
@@ -269,6 +299,7 @@ impl Text<'_> {
             Kind::Rotation => RunKind::Rotation,
             Kind::Static => RunKind::Static,
             Kind::Decay => RunKind::Decay,
+            Kind::Virtual => RunKind::Virtual,
             Kind::Ringdown => RunKind::Ringdown {
                 angle_deg: required("angle_deg", "the angle in degrees at which the pattern is held", |_| true)?,
                 energy_off_s: required(

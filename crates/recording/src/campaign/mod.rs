@@ -62,6 +62,8 @@ pub enum RunKind {
     Static,
     /// The resonator rang freely, without any loop.
     Decay,
+    /// In its loops, its pattern turned by its own forces, or by a rotation that nobody recorded.
+    Virtual,
 }
 
 impl RunKind {
@@ -73,6 +75,7 @@ impl RunKind {
             Self::Ringdown { .. } => "ringdown",
             Self::Static => "static",
             Self::Decay => "decay",
+            Self::Virtual => "virtual",
         }
     }
 }
@@ -143,6 +146,10 @@ pub struct Campaign {
     pub pole_pairs: Option<f64>,
     /// Temperature that parameters refer to, °C, where the campaign says so.
     pub temperature_c: Option<f64>,
+    /// What a volt of command makes of the envelope as designed, V/s, where the campaign says so; positive.
+    pub drive_per_s_v: Option<f64>,
+    /// Control steps a second, Hz, where the campaign says so: forces are held that long. Positive.
+    pub control_hz: Option<f64>,
     /// The runs, in the order of the file.
     pub runs: Vec<Run>,
     /// What a reader of the result should know of the campaign file; the recordings have their own warnings.
@@ -271,13 +278,14 @@ impl Campaign {
             warnings.extend(entry.constant_rate(&mut recording));
             match entry.kind {
                 RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,
-                RunKind::Ringdown { .. } if instrument == Instrument::Sensor => {
+                RunKind::Ringdown { .. } | RunKind::Virtual if instrument == Instrument::Sensor => {
                     return Err(manifest::ringdown_of_a_sensor(path, entry.at));
                 }
                 RunKind::Ringdown { .. } => recording.require_ringdown()?,
                 // every recording has an angle
                 RunKind::Static => {}
                 RunKind::Decay => recording.require_decay()?,
+                RunKind::Virtual => recording.require_virtual()?,
             }
             if runs.iter().any(|other| other.recording.source == file) {
                 warnings.push(format!(
@@ -300,6 +308,7 @@ impl Campaign {
         }
         let Manifest { device, carrier_hz, angular_gain, period_deg, reference, pole_pairs, temperature_c, .. } =
             manifest;
+        let (drive_per_s_v, control_hz) = (manifest.drive_per_s_v, manifest.control_hz);
         Ok(Self {
             source: path.to_path_buf(),
             device,
@@ -310,6 +319,8 @@ impl Campaign {
             reference,
             pole_pairs,
             temperature_c,
+            drive_per_s_v,
+            control_hz,
             runs,
             warnings,
         })
@@ -334,6 +345,8 @@ impl Campaign {
         push_number(&mut text, "period_deg", self.period_deg);
         push_number(&mut text, "pole_pairs", self.pole_pairs);
         push_number(&mut text, "temperature_c", self.temperature_c);
+        push_number(&mut text, "drive_per_s_v", self.drive_per_s_v);
+        push_number(&mut text, "control_hz", self.control_hz);
         if let Some(reference) = self.reference {
             let word = match reference {
                 Reference::Measured => "measured",

@@ -100,6 +100,7 @@ fn record_run(scenario: &Scenario, device: &CarrierDevice, run: &Run) -> Result<
     let (rate_dps, hold_deg, off_s) = match run {
         Run::Rotation { rate_dps, profile: crate::scenario::Profile::Constant, .. } => (*rate_dps, None, f64::INFINITY),
         Run::Rotation { .. } => return Err(NotAtCarrier::Scenario("only constant rates are recorded at the carrier")),
+        Run::Virtual { .. } => return Err(NotAtCarrier::Scenario("virtual precession is not recorded at the carrier")),
         Run::Ringdown { angle_deg, energy_off_s, .. } => (0.0, Some(*angle_deg), *energy_off_s),
     };
     let settings = Settings {

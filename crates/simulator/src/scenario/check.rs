@@ -144,6 +144,21 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
                     return Err(ScenarioError::invalid(field("energy_off_s"), "has to be before the end of the run"));
                 }
             }
+            Run::Virtual { virtual_dps, reversal_s, turned, settle_s, .. } => {
+                if s.instrument == Instrument::Sensor {
+                    return Err(ScenarioError::invalid(field("kind"), "a sensor has nothing that precesses"));
+                }
+                not_negative(&field("virtual_dps"), *virtual_dps)?;
+                positive(&field("reversal_s"), *reversal_s)?;
+                not_negative(&field("settle_s"), *settle_s)?;
+                for [from_s, rate_dps] in turned {
+                    not_negative(&field("turned"), *from_s)?;
+                    finite(&field("turned"), *rate_dps)?;
+                }
+                if !turned.is_sorted_by(|a, b| a[0] < b[0]) {
+                    return Err(ScenarioError::invalid(field("turned"), "has to be in the order of time"));
+                }
+            }
         }
     }
     Ok(())

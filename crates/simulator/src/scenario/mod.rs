@@ -167,6 +167,15 @@ impl Scenario {
                 let start_rad = start_deg.map_or(random_rad, f64::to_radians);
                 Course { legs, amplitude_v, start_rad, hold_rad: None, energy_off_s: None, warm_up_samples, warmer }
             }
+            Run::Virtual { .. } => Course {
+                legs: vec![(0, 0.0)],
+                amplitude_v,
+                start_rad: random_rad,
+                hold_rad: None,
+                energy_off_s: None,
+                warm_up_samples,
+                warmer,
+            },
             Run::Ringdown { angle_deg, energy_off_s, .. } => Course {
                 legs: vec![(0, 0.0)],
                 amplitude_v,

@@ -198,6 +198,31 @@ pub enum Run {
         #[serde(default = "defaults::one")]
         amplitude: f64,
     },
+    /// no table: the pattern is precessed to and fro by the instrument's own forces, and turned by whoever turns it, which is
+    /// not recorded
+    Virtual {
+        /// name of the recording in the campaign's folder
+        file: String,
+        /// commanded precession of the pattern, deg/s
+        virtual_dps: f64,
+        /// time between two reversals of it, s; every other pair is at half the speed
+        #[serde(default = "defaults::reversal_s")]
+        reversal_s: f64,
+        /// length, s
+        duration_s: f64,
+        /// input rates: from when on, s, and how fast, deg/s; at rest before the first
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        turned: Vec<[f64; 2]>,
+        /// set amplitude relative to `amplitude_v`
+        #[serde(default = "defaults::one")]
+        amplitude: f64,
+        /// what the run is for
+        #[serde(default, rename = "use")]
+        purpose: Purpose,
+        /// what the campaign says is to be dropped at the start, s
+        #[serde(default)]
+        settle_s: f64,
+    },
 }
 
 /// What a rotation run is for.
@@ -239,21 +264,25 @@ impl Run {
     /// Name of the recording.
     pub fn file(&self) -> &str {
         match self {
-            Self::Rotation { file, .. } | Self::Ringdown { file, .. } => file,
+            Self::Rotation { file, .. } | Self::Ringdown { file, .. } | Self::Virtual { file, .. } => file,
         }
     }
 
     /// Length, s.
     pub fn duration_s(&self) -> f64 {
         match self {
-            Self::Rotation { duration_s, .. } | Self::Ringdown { duration_s, .. } => *duration_s,
+            Self::Rotation { duration_s, .. }
+            | Self::Ringdown { duration_s, .. }
+            | Self::Virtual { duration_s, .. } => *duration_s,
         }
     }
 
     /// Set amplitude relative to the device's.
     pub fn amplitude(&self) -> f64 {
         match self {
-            Self::Rotation { amplitude, .. } | Self::Ringdown { amplitude, .. } => *amplitude,
+            Self::Rotation { amplitude, .. } | Self::Ringdown { amplitude, .. } | Self::Virtual { amplitude, .. } => {
+                *amplitude
+            }
         }
     }
 }
@@ -276,6 +305,9 @@ mod defaults {
     }
     pub(super) fn control_hz() -> f64 {
         2000.0
+    }
+    pub(super) fn reversal_s() -> f64 {
+        9.0
     }
     pub(super) fn sample_hz() -> f64 {
         100.0

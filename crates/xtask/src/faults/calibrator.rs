@@ -134,7 +134,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "forces are held without a lag",
         "calibrator/src/window.rs",
-        "let push = push.held(T::half() * x);",
+        "let push = push.held(T::half() * held * x);",
         "let push = push.held(T::zero() * x);",
         TESTS,
     ),
@@ -246,8 +246,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "loops are not given time to settle after a disturbance",
         "calibrator/src/cycle.rs",
-        "                s.schedule.settle = self.cycles(3) / 2;\n            }\n        }\n    }\n\n    fn direct",
-        "                s.schedule.settle = s.schedule.settle.max(1);\n            }\n        }\n    }\n\n    fn direct",
+        "                s.schedule.settle = self.cycles(3) / 2;\n            }\n        }\n    }\n\n    pub(crate) fn direct",
+        "                s.schedule.settle = s.schedule.settle.max(1);\n            }\n        }\n    }\n\n    pub(crate) fn direct",
         TESTS,
     ),
     fault(

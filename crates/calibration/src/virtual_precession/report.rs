@@ -1,0 +1,271 @@
+//! What the filter learned, in the form that all instruments share: numbers with intervals, what is not told, and which run
+//! would tell it.
+
+use cvg_calibrator::replay::Replay;
+use cvg_calibrator::{Correction, Parameter, Settings};
+use cvg_model::effects::{EffectId, Values};
+
+use super::identify::PACE_S;
+use crate::error::Refusal;
+use crate::identification::run_report;
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::recording::{Campaign, Instrument, Role};
+use crate::report::calibration::{Calibration, Provenance};
+use crate::report::provenance;
+use crate::report::survey::{Innovation, NotTold, Survey, VirtualPrecession};
+use crate::report::{EffectReport, Estimate, ParameterReport, Status, Tool};
+use crate::survey::Surveyed;
+
+/// What was learned, ready to be said.
+struct Finding<'a> {
+    learned: &'a Replay<f64>,
+    /// in force, and believed beyond
+    correction: Correction<f64>,
+    settings: &'a Settings,
+    detection_known: bool,
+}
+
+/// Reports.
+///
+/// # Errors
+/// [`Refusal`] where nothing is told, or what is told is no calibration.
+pub(crate) fn report(
+    campaign: &Campaign,
+    settings: &Settings,
+    learned: &Replay<f64>,
+    heldout: Vec<Innovation>,
+) -> Result<Surveyed, Refusal> {
+    let status = learned.status();
+    let no_answer = |problem: &str, wanted: &str| Refusal::no_answer(&campaign.device, problem, wanted);
+    let correction = if status.detection_known { learned.believed() } else { Some(*learned.correction()) };
+    let Some(correction) = correction else {
+        return Err(no_answer("what these recordings tell is no instrument", "other runs"));
+    };
+    let found = Finding { learned, correction, settings, detection_known: status.detection_known };
+    if !(status.detection_known || learned.told(Parameter::ForceRatio)) {
+        return Err(no_answer(
+            "the pattern hardly moved: nothing is told of readout or drives",
+            "half a minute and more of virtual precession to and fro, and ten seconds of turning by hand",
+        ));
+    }
+    let runs = campaign.runs.iter().map(run_report).collect();
+    let inputs = provenance::sums(&provenance::files(campaign));
+    let mut out = Survey::new(campaign.device.clone(), "gyroscope", inputs, runs);
+    for (run, of) in out.runs.iter_mut().zip(&campaign.runs) {
+        run.r#use = if of.role == Role::Holdout { "holdout".into() } else { "fit".into() };
+    }
+    out.warnings = campaign.all_warnings().map(str::to_owned).collect();
+    out.warnings.extend(remarks(campaign, settings.control_s));
+    out.effects = found.effects();
+    (out.detection_gain_ratio, out.actuation_gain_ratio) = (found.detection_ratio(), found.actuation_ratio());
+    out.virtual_precession = Some(VirtualPrecession {
+        seconds: learned.seconds(),
+        detection_known: status.detection_known,
+        bias_deg: status.bias_rad.to_degrees(),
+        parameters: found.parameters(),
+        not_told: found.not_told(),
+        heldout,
+    });
+    let calibration = if status.detection_known {
+        Some(found.calibration(campaign)?)
+    } else {
+        out.status = Status::Neutral;
+        out.reason = Some(format!(
+            "at rest only the product of detection and actuation shows: the two are not told apart, and nothing is undone \
+             ({:.2}° of bias may be left)",
+            status.bias_rad.to_degrees()
+        ));
+        None
+    };
+    Ok(Surveyed { report: out, calibration, curve: None })
+}
+
+/// What the campaign left unsaid.
+fn remarks(campaign: &Campaign, interval_s: f64) -> Vec<String> {
+    let mut out = Vec::new();
+    if campaign.drive_per_s_v.is_none() {
+        out.push(
+            "drive_per_s_v is not given in [campaign]: a volt of command is taken to make 1 V/s of the envelope".into(),
+        );
+    }
+    if campaign.control_hz.is_none() && interval_s > PACE_S {
+        out.push("control_hz is not given in [campaign]: forces are taken to follow the pattern between rows".into());
+    }
+    for run in campaign.runs.iter().filter(|r| r.recording.virtual_dps.is_none()) {
+        out.push(format!("{}: without virtual_dps nothing is taken to have been commanded", run.file.display()));
+    }
+    if campaign.angular_gain.is_none() {
+        out.push("no run tells the angular gain: a table or a known rate would".into());
+    }
+    out
+}
+
+fn entry(name: &str, unit: &str, value: f64, deviation: Option<f64>) -> ParameterReport {
+    let ci95 = deviation.map(|d| Estimate::new(value, d).ci95);
+    ParameterReport { name: name.into(), unit: unit.into(), value, ci95 }
+}
+
+impl Finding<'_> {
+    fn deviation(&self, of: &[(Parameter, f64)]) -> f64 {
+        self.learned.variance(of).sqrt()
+    }
+
+    /// G_Dy/G_Dx.
+    fn detection_ratio(&self) -> Option<Estimate> {
+        let deviation = self.deviation(&[(Parameter::DetectionRatio, 1.0)]);
+        self.detection_known.then(|| Estimate::new(1.0 + self.correction.detection_ratio(), deviation))
+    }
+
+    /// G_Ax/G_Ay: the drives as they are seen through the readout, less what is not known of that.
+    fn actuation_ratio(&self) -> Option<Estimate> {
+        if !(self.detection_known && self.learned.told(Parameter::ForceRatio)) {
+            return None;
+        }
+        let d = self.correction.drives();
+        let deviation = self.deviation(&[(Parameter::ForceRatio, 1.0), (Parameter::DetectionRatio, -1.0)]);
+        Some(Estimate::new(d.xx.re / d.yy.re, deviation))
+    }
+
+    /// Effects of the library, with their values and deviations. Those of mechanics, offsets and skewed drives are too
+    /// narrow, and not given.
+    fn members(&self) -> Vec<(EffectId, Values<f64>, Vec<Option<f64>>)> {
+        use Parameter as P;
+        let (c, a) = (&self.correction, self.settings.amplitude_v);
+        let own = |p: P| self.deviation(&[(p, 1.0)]);
+        let told = |of: &[P]| of.iter().all(|p| self.learned.told(*p));
+        let mut out = Vec::new();
+        let mut add = |id, values: [f64; 2], deviations: &[Option<f64>]| {
+            out.push((id, [values[0], values[1], 0.0, 0.0], deviations.to_vec()));
+        };
+        if told(&[P::AnisodampingCos, P::AnisodampingSin]) {
+            let both = [P::AnisodampingCos, P::AnisodampingSin].map(|p| 2.0 * c.known(p));
+            add(EffectId::Anisodamping, both, &[None, None]);
+        }
+        if told(&[P::SplitCos, P::SplitSin]) {
+            add(EffectId::Anisoelasticity, [P::SplitCos, P::SplitSin].map(|p| c.known(p)), &[None, None]);
+        }
+        if told(&[P::Cubic]) {
+            let kappa = 4.0 / (3.0 * a * a);
+            add(EffectId::DetectionCubic, [kappa * c.known(P::Cubic), 0.0], &[Some(kappa * own(P::Cubic))]);
+        }
+        if told(&[P::OffsetX, P::OffsetY]) {
+            add(EffectId::DetectionOffset, [P::OffsetX, P::OffsetY].map(|p| a * c.known(p)), &[None, None]);
+        }
+        if !self.detection_known {
+            return out;
+        }
+        let ratio = 1.0 + c.detection_ratio();
+        if let Some(e) = self.actuation_ratio() {
+            add(EffectId::ActuationGainMismatch, [e.value, 0.0], &[Some(e.half_width() / 1.96)]);
+        }
+        if told(&[P::ForceSkew, P::ForceRotation]) {
+            let d = c.drives();
+            add(EffectId::ActuationSkew, [(d.yx.re + d.xy.re) / d.xx.re, 0.0], &[None]);
+        }
+        add(EffectId::DetectionSkew, [c.detection_skew() / ratio, 0.0], &[Some(own(P::DetectionSkew))]);
+        add(EffectId::DetectionGainMismatch, [ratio, 0.0], &[Some(own(P::DetectionRatio))]);
+        add(EffectId::DetectionPhase, [c.detection_phase(), 0.0], &[Some(own(P::DetectionPhase))]);
+        out.sort_by_key(|(id, ..)| *id);
+        out
+    }
+
+    fn effects(&self) -> Vec<EffectReport> {
+        let report = |(id, values, deviations): (EffectId, Values<f64>, Vec<Option<f64>>)| {
+            let description = id.description();
+            let parameters = description.parameters.iter().zip(values).zip(deviations);
+            EffectReport {
+                id: description.id.into(),
+                origin: Origin::Declared,
+                parameters: parameters.map(|((p, value), d)| entry(p.name, p.unit, value, d)).collect(),
+                heldout_rms_deg: None,
+                evidence: evidence(id).into(),
+                confounded_with: Vec::new(),
+                separated_by: None,
+            }
+        };
+        self.members().into_iter().map(report).collect()
+    }
+
+    /// What no effect of the library says.
+    fn parameters(&self) -> Vec<ParameterReport> {
+        use Parameter as P;
+        let (c, d) = (&self.correction, self.correction.drives());
+        let own = |p: P| Some(self.deviation(&[(p, 1.0)]));
+        let mut out = Vec::new();
+        if self.learned.told(P::ForceScale) {
+            out.push(entry("drive_per_s_v", "1/s", self.settings.drive_per_s * d.xx.re, None));
+            out.push(entry("damping_per_s", "1/s", c.known(P::Damping), None));
+        }
+        if !self.detection_known {
+            out.push(entry("product_ratio", "1", d.yy.re / d.xx.re, own(P::ForceRatio)));
+            out.push(entry("product_skew", "1", d.yx.re + d.xy.re, own(P::ForceSkew)));
+        }
+        if self.learned.told(P::ForceRotation) {
+            out.push(entry("drive_rotation", "rad", -d.xy.re, None));
+        }
+        if self.learned.told(P::ForcePhase) {
+            out.push(entry("drive_phase", "rad", d.xx.im.atan2(d.xx.re), None));
+        }
+        out
+    }
+
+    fn not_told(&self) -> Vec<NotTold> {
+        let mut out = Vec::new();
+        let mut say = |what: &str, by: &str| out.push(NotTold { what: what.into(), separated_by: by.into() });
+        if !self.detection_known {
+            say(
+                "the share of the detection in the product of detection and actuation",
+                "ten seconds of turning by hand, 30 to 90 deg/s, in any way that sweeps the pattern by half a turn; or a run \
+                 with a second split of the frequencies",
+            );
+        }
+        if !self.learned.told(Parameter::ForceScale) {
+            say(
+                "the scale of the forces, and with it damping and split in units of time",
+                "virtual precession to and fro at rest",
+            );
+        }
+        say("the angular gain, the common gain of the detection, a constant rate", "a rotation at a known rate");
+        out
+    }
+
+    fn calibration(&self, campaign: &Campaign) -> Result<Calibration, Refusal> {
+        let mut h =
+            Hypothesis::ideal(Instrument::Gyroscope, std::f64::consts::PI, campaign.angular_gain.unwrap_or(1.0));
+        h.damping_per_s = self.correction.known(Parameter::Damping);
+        let d = self.correction.drives();
+        h.force_scale = self.settings.drive_per_s * (d.xx.re * d.yy.re).sqrt();
+        let member = |(id, values, _)| Member { id, values, origin: Origin::Declared, refined: true };
+        h.members = self.members().into_iter().map(member).collect();
+        let low_high = campaign.runs.iter().filter_map(|r| provenance::amplitude(&r.recording));
+        let (low, high) = low_high.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+        let provenance = Provenance {
+            tool: Some(Tool::default()),
+            inputs: provenance::sums(&provenance::files(campaign)),
+            amplitude_v: (high > 0.0).then_some([low, high]),
+            readout_unit: None,
+        };
+        let calibration = Calibration { device: campaign.device.clone(), hypothesis: h, provenance };
+        Calibration::from_text(&calibration.to_text(), "the calibration").map_err(|why| {
+            Refusal::no_answer(&campaign.device, format!("what was found is no calibration: {why}"), "other runs")
+        })?;
+        Ok(calibration)
+    }
+}
+
+/// What speaks for an effect.
+fn evidence(id: EffectId) -> &'static str {
+    match id {
+        EffectId::DetectionGainMismatch | EffectId::DetectionSkew => {
+            "the measured energy of a pattern that rotation turned: rotation draws none (Equation 6)"
+        }
+        EffectId::DetectionPhase => "the measured quadrature of a pattern that rotation turned",
+        EffectId::ActuationGainMismatch | EffectId::ActuationSkew => {
+            "precession and energy against the forces that were commanded, the readout undone"
+        }
+        EffectId::Anisodamping => "energy and angle of a pattern turned by known forces, both ways",
+        EffectId::Anisoelasticity => "the forces that hold the quadrature, over the angle",
+        EffectId::DetectionCubic => "four times the angle in the measured angle and energy",
+        _ => "the angle itself in the measured angle and energy",
+    }
+}
