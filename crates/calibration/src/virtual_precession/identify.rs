@@ -63,7 +63,7 @@ pub(crate) fn identify(campaign: &Campaign, options: &Options<'_>) -> Result<Sur
                 "the equation of motion does not follow these runs: {:.1e} of the {} are left",
                 i.rms_rad, i.channel
             ),
-            "readout and commands in volts, their signs as documented, drive_per_s_v in [campaign]",
+            "loops that have settled (settle_s), readout and commands in volts with the signs documented, drive_per_s_v in [campaign]",
         ));
     }
     (options.progress)("learning from all of it");

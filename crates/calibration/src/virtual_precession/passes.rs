@@ -48,7 +48,7 @@ pub(crate) fn learn(settings: &Settings, hold_s: f64, parts: &[Part<'_>]) -> Res
         Refusal::no_answer(
             "campaign",
             problem,
-            "readout and commands in volts, their signs as documented, drive_per_s_v",
+            "loops that have settled (settle_s), readout and commands in volts with the signs documented, drive_per_s_v",
         )
     };
     let mut replay = Replay::new(settings, hold_s).map_err(|e| refuse(&e.to_string()))?;
