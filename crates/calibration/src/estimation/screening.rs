@@ -17,6 +17,8 @@ use crate::report::RunReport;
 const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// Share of the runs that may be left out because they are broken in themselves.
 const MOST_BROKEN: f64 = 0.5;
+/// Runs that have to be left where nothing can be made of one: of a campaign's two, which of them is as it was meant is not known.
+const FEWEST_LEFT: usize = 2;
 /// A run with more slips than this has no clock.
 const MOST_SLIPS: usize = 8;
 /// An angle that scatters by more than this share of its period about its line does not follow the input.
@@ -133,7 +135,7 @@ impl Screen {
                 Err(why) => failed.push((number, why)),
             }
         }
-        if failed.len() as f64 > MOST_BROKEN * count as f64 || ready.is_empty() {
+        if failed.len() as f64 > MOST_BROKEN * count as f64 || ready.len() < FEWEST_LEFT {
             return failed.into_iter().next().map_or(Ok(ready), |(_, why)| Err(why));
         }
         for (number, why) in failed {
