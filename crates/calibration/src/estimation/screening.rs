@@ -17,7 +17,7 @@ use crate::report::RunReport;
 const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// Share of the runs that may be left out because they are broken in themselves.
 const MOST_BROKEN: f64 = 0.5;
-/// Runs that have to be left where nothing can be made of one: of a campaign's two, which of them is as it was meant is not known.
+/// Runs to fit that have to be left where nothing can be made of one: of two, which is as it was meant is not known.
 const FEWEST_LEFT: usize = 2;
 /// A run with more slips than this has no clock.
 const MOST_SLIPS: usize = 8;
@@ -119,14 +119,19 @@ impl Screen {
     ) -> Result<Vec<Track>, Refusal> {
         let split = runs.iter().all(|r| r.role == Role::Fit);
         let tracks = runs.into_iter().map(|r| Track::new(r, period_rad, split)).collect();
-        self.ready(tracks, warnings)
+        self.ready(tracks, |track| track, warnings)
     }
 
     /// What could be made of the runs that are in; those of which it could not are left out.
     ///
     /// # Errors
     /// The first of why not, where too few are left.
-    fn ready<T>(&mut self, made: Vec<Result<T, Refusal>>, warnings: &mut Vec<String>) -> Result<Vec<T>, Refusal> {
+    fn ready<T>(
+        &mut self,
+        made: Vec<Result<T, Refusal>>,
+        track: impl Fn(&T) -> &Track,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<T>, Refusal> {
         let (count, numbers) = (made.len(), self.kept.clone());
         let (mut ready, mut failed) = (Vec::with_capacity(count), Vec::new());
         for (number, made) in numbers.into_iter().zip(made) {
@@ -135,7 +140,8 @@ impl Screen {
                 Err(why) => failed.push((number, why)),
             }
         }
-        if failed.len() as f64 > MOST_BROKEN * count as f64 || ready.len() < FEWEST_LEFT {
+        let fitted = ready.iter().filter(|made| track(made).samples(Role::Fit) > 0).count();
+        if failed.len() as f64 > MOST_BROKEN * count as f64 || fitted < FEWEST_LEFT {
             return failed.into_iter().next().map_or(Ok(ready), |(_, why)| Err(why));
         }
         for (number, why) in failed {
@@ -158,7 +164,8 @@ impl Screen {
     ) -> Result<Vec<(Track, Motion)>, Refusal> {
         let open = Guess::Open(self.stated);
         let moving = tracks.into_iter().map(|t| motion(&t, start, open).map(|m| (t, m))).collect();
-        let (tracks, first): (Vec<Track>, Vec<Motion>) = self.ready(moving, warnings)?.into_iter().unzip();
+        let (tracks, first): (Vec<Track>, Vec<Motion>) =
+            self.ready(moving, |(track, _)| track, warnings)?.into_iter().unzip();
         let guess = self.settle(&tracks, &first, start)?;
         let mut moving: Vec<(Track, Motion)> = Vec::with_capacity(tracks.len());
         let mut odd: Vec<(usize, String)> = Vec::new();
@@ -209,7 +216,7 @@ impl Screen {
             let problem = format!("the pattern turns through {:.1}° only", motion.travel.to_degrees());
             Err(Refusal::new(&track.name, problem, "at least half a turn (180°)"))
         };
-        self.ready(moving.into_iter().map(far_enough).collect(), warnings)
+        self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)
     }
 
     /// The runs without those at these places.
