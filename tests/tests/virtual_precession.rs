@@ -31,8 +31,8 @@ fn recorded(device: &Device, seed: u64, bench: Bench, every: usize) -> Recording
     let mut columns: [Vec<f64>; 8] = Default::default();
     for i in 0..steps(LENGTH_S) {
         let t = run.t;
-        let speed: f64 = if (t / (4.0 * REVERSAL_S)) as u64 % 2 == 0 { 40.0 } else { 20.0 };
-        let virtual_dps = if (t / REVERSAL_S) as u64 % 2 == 0 { speed } else { -speed };
+        let speed: f64 = if ((t / (4.0 * REVERSAL_S)) as u64).is_multiple_of(2) { 40.0 } else { 20.0 };
+        let virtual_dps = if ((t / REVERSAL_S) as u64).is_multiple_of(2) { speed } else { -speed };
         run.asked_rad_s = virtual_dps.to_radians();
         let turned = matches!(bench, Bench::Hand) && (100.0..110.0).contains(&t);
         // by hand: never the same rate
