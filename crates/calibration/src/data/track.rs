@@ -17,8 +17,10 @@ use crate::recording::{Recording, Role, Run};
 /// A rotation run, ready for a fit.
 #[derive(Debug)]
 pub(crate) struct Track {
-    /// name of the run, for messages
+    /// where the run was read from, for refusals
     pub(crate) name: String,
+    /// the run as its campaign names it, for reports: the same wherever the campaign lies
+    pub(crate) file: String,
     /// time of the recording, s
     pub(crate) t_s: Vec<f64>,
     /// input angle, rad, 0 where the table's own angle starts
@@ -100,7 +102,8 @@ impl Track {
     /// # Errors
     /// Where there is no angle.
     pub(crate) fn whole(run: Run, period_rad: f64) -> Result<Self, Refusal> {
-        let name = crate::data::track::run_name(&run);
+        let name = run_name(&run);
+        let file = run.file.display().to_string();
         let role = run.role;
         let amplitude = run.amplitude;
         let mut recording = run.recording;
@@ -121,7 +124,7 @@ impl Track {
         let (t_s, turn_rad_s) = (recording.t_s, Vec::new());
         let warmer_k = Vec::new();
         let mut track =
-            Self { name, t_s, input_rad, segments, stride: 1, source, commands, temp_c, warmer_k, turn_rad_s };
+            Self { name, file, t_s, input_rad, segments, stride: 1, source, commands, temp_c, warmer_k, turn_rad_s };
         if track.has_commands() {
             track.turn_rad_s = (0..track.t_s.len()).into_par_iter().map(|i| track.turn(i)).collect();
         }

@@ -100,7 +100,7 @@ impl Inference<'_> {
             let longest = fitted.max_by_key(|(s, _)| s.range.len()).filter(|_| p.drifts);
             let steady = longest.zip(p.track.one_way_rate());
             let k = self.hypothesis().angular_gain;
-            (p.track.name.as_str(), steady.map(|((_, s), rate)| [k + sense * s.drift / rate, DRIFT_RAD_S / rate.abs()]))
+            (p.track.file.as_str(), steady.map(|((_, s), rate)| [k + sense * s.drift / rate, DRIFT_RAD_S / rate.abs()]))
         })
     }
 
@@ -117,7 +117,7 @@ impl Inference<'_> {
         if identified.is_none() {
             warnings.push("the campaign cannot tell the detection gain ratio".into());
         }
-        let runs = self.dataset.tracks.iter().map(|t| t.track.name.as_str()).zip(own.iter().copied());
+        let runs = self.dataset.tracks.iter().map(|t| t.track.file.as_str()).zip(own.iter().copied());
         let ratio = covering(identified?, "detection gain ratio", runs, CONTRADICTS, warnings);
         Some(self.borne_out(ratio, warnings))
     }
@@ -131,7 +131,7 @@ impl Inference<'_> {
             return ratio;
         }
         let alone = |rate: f64| ratio.value - 0.5 * damping / self.hypothesis().precession(rate);
-        let runs = self.dataset.tracks.iter().map(|t| (t.track.name.as_str(), alone(t.track.mean_rate())));
+        let runs = self.dataset.tracks.iter().map(|t| (t.track.file.as_str(), alone(t.track.mean_rate())));
         let odd: Vec<(&str, f64)> = runs.filter(|(_, own)| (own - ratio.value).abs() > ratio.half_width()).collect();
         if odd.is_empty() {
             return ratio;

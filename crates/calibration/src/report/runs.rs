@@ -87,7 +87,7 @@ pub(crate) fn tell_apart(
         let agrees = gain.agrees(&Gain { value: k, within: 0.0 });
         run.agrees = Some(agrees);
         if !agrees {
-            warnings.push(format!("{}: its angular gain is {own:.5}, that of all runs {k:.5}", track.track.name));
+            warnings.push(format!("{}: its angular gain is {own:.5}, that of all runs {k:.5}", track.track.file));
         }
     }
     for run in dataset.screen.left_out_of(runs) {
