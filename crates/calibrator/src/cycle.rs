@@ -22,6 +22,21 @@ const FLOOR: [f64; 5] = [1e-3, 5e-4, 1e-4, 2e-5, 3e-6];
 /// White noise never falls below this, rad.
 const GATE: f64 = 36.0;
 
+/// How well the precession by force is known: standard deviations of the force scale, relative, and of the constant rate,
+/// rad/s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Doubt<T> {
+    force_scale: T,
+    rate: T,
+}
+
+impl<T: Float> Doubt<T> {
+    pub(crate) fn of(s: &State<T>) -> Self {
+        let of = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
+        Self { force_scale: of(Parameter::ForceScale), rate: of(Parameter::Rate) }
+    }
+}
+
 impl<T: Float> Calibrator<T> {
     pub(crate) fn work(&self, s: &mut State<T>) {
         let k = s.step;
@@ -253,20 +268,15 @@ impl<T: Float> Calibrator<T> {
 
     /// Whether the instrument turns: what nothing explains of the angle, against how well the precession is known.
     pub(crate) fn detect(&self, s: &mut State<T>) {
-        let limit = self.doubtful(s);
-        self.notice(s, limit);
+        self.notice(s, Doubt::of(s));
     }
 
-    /// What forces and mechanics, as well as they are known, may leave of the rate unexplained, rad/s.
-    pub(crate) fn doubtful(&self, s: &State<T>) -> T {
-        let doubt = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
-        T::from_f64(0.02)
-            + T::from_f64(2.5) * doubt(Parameter::ForceScale) * s.sample.push.aside.magnitude()
-            + T::two() * doubt(Parameter::Rate)
-    }
-
-    /// The instrument turns where more than `limit` is unexplained, and for two seconds after.
-    pub(crate) fn notice(&self, s: &mut State<T>, limit: T) {
+    /// The instrument turns where more is unexplained than forces and mechanics may leave of the rate, as well as they are
+    /// known, and for two seconds after.
+    pub(crate) fn notice(&self, s: &mut State<T>, doubt: Doubt<T>) {
+        let limit = T::from_f64(0.02)
+            + T::from_f64(2.5) * doubt.force_scale * s.sample.push.aside.magnitude()
+            + T::two() * doubt.rate;
         let sc = &mut s.schedule;
         sc.rate = sc.turn * self.cycles_per_s;
         sc.unexplained = sc.unexplained + T::ratio(1, 5) * (sc.rate - sc.unexplained);

@@ -9,7 +9,7 @@ use cvg_model::{AxisForces, Envelope, Float, Pendulum};
 use crate::commit::SHARED;
 use crate::complex::Complex;
 use crate::correction::Correction;
-use crate::cycle::MEASURE;
+use crate::cycle::{Doubt, MEASURE};
 use crate::parameters::{DETECTION, N, Parameter, get};
 use crate::regressors::CHANNELS;
 use crate::state::{Commit, Filter, Schedule, State};
@@ -27,8 +27,8 @@ pub struct Replay<T> {
     learning: Learning,
     /// a row before this one, without a gap between
     follows: bool,
-    /// how well force scale and constant rate were known at the end of the last pass
-    doubt: Option<(T, T)>,
+    /// as of the end of the last pass
+    doubt: Option<Doubt<T>>,
     /// what is taken for noise, in place of what the filter makes of it on its way
     levels: Option<[T; CHANNELS]>,
     turning: u32,
@@ -143,15 +143,10 @@ impl<T: Float> Replay<T> {
         }
         c.direct(s);
         c.integrate(s, 1);
-        let limit = match self.doubt {
-            Some((scale, rate)) => {
-                T::from_f64(0.02) + T::from_f64(2.5) * scale * s.sample.push.aside.magnitude() + T::two() * rate
-            }
-            None => c.doubtful(s),
-        };
+        let doubt = self.doubt.unwrap_or_else(|| Doubt::of(s));
         // a pass has no stages to go back to
         let stage = core::mem::replace(&mut s.schedule.stage, 1);
-        c.notice(s, limit);
+        c.notice(s, doubt);
         s.schedule.stage = stage;
         c.integrate(s, 0);
         c.integrate(s, 2);
@@ -201,9 +196,8 @@ impl<T: Float> Replay<T> {
             let far = delta.magnitude() / s.filter.ud.variance(j).sqrt();
             farthest = if far > farthest { far } else { farthest };
         }
-        let doubt = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
         if s.schedule.angle_used >= c.cycles(10) {
-            self.doubt = Some((doubt(Parameter::ForceScale), doubt(Parameter::Rate)));
+            self.doubt = Some(Doubt::of(s));
         }
         Ok(farthest)
     }

@@ -36,8 +36,8 @@ const SPIKE: f64 = 6.0;
 /// Unknowns of a run: the gain's deviation, second and fourth harmonic of the angle, which a run leaves off in the middle.
 const UNKNOWNS: usize = 5;
 
-/// Rate, deg/s, and angular gain of each run, where their rates are such as tell a scale factor. Every run drifts by itself in a fit of its own: a gain that goes with the rate
-/// would else be taken for what the drive does.
+/// Rate, deg/s, and angular gain of each run, where their rates are such as tell a scale factor. Every run drifts by itself in
+/// a fit of its own: a gain that goes with the rate would else be taken for what the drive does.
 pub(crate) fn gains(dataset: &mut Dataset, fitted: &Fitted) -> Vec<(f64, Estimate)> {
     if range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees())).is_none() {
         return Vec::new();

@@ -4,7 +4,7 @@
 use cvg_calibrator::Settings;
 use cvg_calibrator::replay::Learning;
 
-use super::passes::{CHANNELS, Left, learn, rms, walk, white};
+use super::passes::{CHANNELS, Left, WANTED, learn, rms, walk, white};
 use super::report::report;
 use super::runs::{VirtualRun, all, parts};
 use crate::error::Refusal;
@@ -63,7 +63,7 @@ pub(crate) fn identify(campaign: &Campaign, options: &Options<'_>) -> Result<Sur
                 "the equation of motion does not follow these runs: {:.1e} of the {} are left",
                 i.rms_rad, i.channel
             ),
-            "loops that have settled (settle_s), readout and commands in volts with the signs documented, drive_per_s_v in [campaign]",
+            WANTED,
         ));
     }
     (options.progress)("learning from all of it");

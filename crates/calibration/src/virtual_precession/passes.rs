@@ -23,6 +23,10 @@ const ENOUGH: usize = 2 * MEMORY;
 /// Channels of the filter.
 pub(crate) const CHANNELS: [&str; 3] = ["amplitude", "angle", "ellipticity"];
 
+/// What recordings that cannot be followed lack, most often.
+pub(crate) const WANTED: &str = "loops that have settled (settle_s), readout and commands in volts with the signs documented, \
+                                 drive_per_s_v in [campaign]";
+
 /// Walks parts of runs once.
 pub(crate) fn walk(replay: &mut Replay<f64>, parts: &[Part<'_>], stage: u8, learning: Learning) -> Left {
     replay.begin(stage, learning);
@@ -44,13 +48,7 @@ pub(crate) fn walk(replay: &mut Replay<f64>, parts: &[Part<'_>], stage: u8, lear
 /// # Errors
 /// Recordings that no instrument made.
 pub(crate) fn learn(settings: &Settings, hold_s: f64, parts: &[Part<'_>]) -> Result<Replay<f64>, Refusal> {
-    let refuse = |problem: &str| {
-        Refusal::no_answer(
-            "campaign",
-            problem,
-            "loops that have settled (settle_s), readout and commands in volts with the signs documented, drive_per_s_v",
-        )
-    };
+    let refuse = |problem: &str| Refusal::no_answer("campaign", problem, WANTED);
     let mut replay = Replay::new(settings, hold_s).map_err(|e| refuse(&e.to_string()))?;
     let pass = |replay: &mut Replay<f64>, stage| {
         walk(replay, parts, stage, Learning::On);

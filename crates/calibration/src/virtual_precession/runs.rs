@@ -8,7 +8,7 @@ use cvg_model::{AxisForces, Envelope};
 
 use crate::data::track::wrapped;
 use crate::error::Refusal;
-use crate::estimation::statistics::median;
+use crate::estimation::statistics::{line, median};
 use crate::recording::{Role, Run};
 
 /// A row: what was read, and what was put out to the drives, V.
@@ -109,16 +109,15 @@ impl VirtualRun {
         let angle = |r: &Row| r.seen.pendulum().angle();
         let turned: Vec<f64> = self.rows.windows(2).map(|w| wrapped(angle(&w[1]) - angle(&w[0]), PI)).collect();
         let sums = turned.chunks_exact(second).zip(self.asked_rad_s.chunks_exact(second));
-        let pairs: Vec<(f64, f64)> = sums
+        let (asked, turned): (Vec<f64>, Vec<f64>) = sums
             .map(|(turned, asked)| (asked.iter().sum::<f64>() * self.interval_s, turned.iter().sum()))
             .filter(|(asked, turned): &(f64, f64)| asked.is_finite() && turned.is_finite())
-            .collect();
-        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len().max(1) as f64;
-        let (a, t) = (mean(&|p| p.0), mean(&|p| p.1));
-        let spread = mean(&|p| (p.0 - a).powi(2));
-        let share = mean(&|p| (p.0 - a) * (p.1 - t)) / spread;
-        let left = mean(&|p| (p.1 - t - share * (p.0 - a)).powi(2));
-        let error = (left / spread / pairs.len().max(1) as f64).sqrt();
+            .unzip();
+        let (share, offset) = line(&asked, &turned);
+        let mean = asked.iter().sum::<f64>() / asked.len().max(1) as f64;
+        let spread: f64 = asked.iter().map(|a| (a - mean).powi(2)).sum();
+        let left: f64 = asked.iter().zip(&turned).map(|(a, t)| (t - share * a - offset).powi(2)).sum();
+        let error = (left / spread / asked.len().max(1) as f64).sqrt();
         (error < CLEAR).then_some(share)
     }
 }
