@@ -107,15 +107,15 @@ fn a_lag_shows_in_the_ramps_of_a_run_at_one_speed() {
     }
 }
 
-/// A magnetic encoder at the full steps of a motor with 200 a turn: every third quadruple is held out.
-fn encoder_at_stations(held: bool, seed: u64) -> Run {
+/// A magnetic encoder at the full steps of a motor with 200 a turn: every third quadruple is held out, and of what remains
+/// every `of_them`th step is measured. Full steps of a motor are not alike: two phases (50 per turn), two signs (100).
+fn encoder_at_stations(held: bool, of_them: usize, [phases, signs]: [f64; 2], seed: u64) -> Run {
     let mut noise = Noise::new(seed);
-    let stations: Vec<u32> = (0..200).filter(|i| (i / 4 % 3 == 2) == held).collect();
+    let stations: Vec<u32> = (0..200).filter(|i| (i / 4 % 3 == 2) == held).step_by(of_them).collect();
     let theta = |i: u32, noise: f64| {
         let a = f64::from(i) * TAU / 200.0;
         let error = 0.15 * (a + 0.3).sin() + 0.1 * (2.0 * a).cos() + 0.04 * (4.0 * a).sin();
-        // full steps of a motor are not alike: two phases, two signs
-        let motor = 0.03 * (50.0 * a).cos() + 0.02 * (100.0 * a).cos();
+        let motor = phases * (50.0 * a).cos() + signs * (100.0 * a).cos();
         f64::from(i) * 1.8 + error + motor + 0.012 * noise
     };
     let recording = Recording {
@@ -129,12 +129,26 @@ fn encoder_at_stations(held: bool, seed: u64) -> Run {
 
 #[test]
 fn a_hundred_and_thirty_three_stations_are_enough_for_an_encoder() {
-    let i = identified(sensor(vec![encoder_at_stations(false, 1), encoder_at_stations(true, 2)]));
+    let of = |held, seed| encoder_at_stations(held, 1, [0.03, 0.02], seed);
+    let i = identified(sensor(vec![of(false, 1), of(true, 2)]));
     assert!(held_out(&i) < 1.5 * 0.012, "{}° left of 0.012° noise: {:#?}", held_out(&i), i.report.effects);
     let lines = lines(&i);
     assert!(lines.contains(&50.0) && lines.contains(&100.0), "{lines:?}");
     // what belongs to the motor is not replayed
     assert!(i.calibration.hypothesis.members.is_empty() && i.calibration.hypothesis.angle_table.is_some());
+}
+
+/// 46 stations 5.4° or 12.6° apart: there 11 per turn looks nearly like 50, and 22 and 39 like 100.
+#[test]
+fn stations_at_uneven_distances_tell_a_line_from_its_alias_or_none() {
+    for seed in 0..4 {
+        let of = |held, motor, seed| encoder_at_stations(held, 3, motor, seed);
+        let i = identified(sensor(vec![of(false, [0.13, 0.0], seed), of(true, [0.13, 0.0], seed + 10)]));
+        assert_eq!(lines(&i), [50.0], "seed {seed}");
+        assert!(held_out(&i) < 2.0 * 0.012, "seed {seed}: {}° left of 0.012° noise", held_out(&i));
+        let i = identified(sensor(vec![of(false, [0.012, 0.012], seed), of(true, [0.012, 0.012], seed + 10)]));
+        assert!(lines(&i).iter().all(|n| [50.0, 100.0].contains(n)), "seed {seed}: {:?}", lines(&i));
+    }
 }
 
 /// A resolver of eight pole pairs, off centre by 0.5° of its shaft, over so many turns; its angle is that of the poles.

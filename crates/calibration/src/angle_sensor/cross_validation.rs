@@ -17,6 +17,9 @@ const PERIODS_OF_ONE: f64 = 1.75;
 const FEWEST_RUNS: usize = 3;
 /// Standard errors that one more line has to gain.
 const BETTER: f64 = 1.0;
+/// Standard errors by which a line has to be better than one that looks like it on these stations: a wrong one adds its own
+/// error to stations that were not seen, where none leaves the line's only (2.3 % by chance).
+const NO_ALIAS: f64 = 2.0;
 
 /// Standard errors that a simpler model may be worse by than the best.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,8 +148,17 @@ impl Losses {
 
     /// Better than `other` by more than the standard errors asked for.
     pub(crate) fn is_better_than(&self, other: &Self) -> bool {
+        self.is_better_by(BETTER, other)
+    }
+
+    /// So much better than the losses with one of its aliases in its place that it is no accident.
+    pub(crate) fn is_told_from_its_alias(&self, alias: &Self) -> bool {
+        self.is_better_by(NO_ALIAS, alias)
+    }
+
+    fn is_better_by(&self, standard_errors: f64, other: &Self) -> bool {
         let (excess, error) = other.excess_over(self);
-        excess > BETTER * error
+        excess > standard_errors * error
     }
 }
 

@@ -19,22 +19,29 @@ const FEWEST: usize = 8;
 const OF_EVERY_TABLE: usize = 4;
 /// Lines that are nearer than this, per turn, are one.
 const ONE_LINE: f64 = 0.25;
+/// A line is the rival of the strongest where it has this share of its power and is so much like it on these stations.
+const RIVAL: f64 = 0.4;
+/// Lines that are tried, the strongest among them.
+const MOST_RIVALS: usize = 4;
+/// A usual distance of stations is at most so many times their spacing.
+const MOST_PARTS: u32 = 4;
+/// Share of the spacing by which a station may be off the grid: engineering choice.
+const OFF_THE_GRID: f64 = 0.05;
 /// A line slower than the sensor's period, as the eccentricity of many pole pairs makes, has to come round again: within one
 /// turn it is no more than a drift.
 const TURNS_OF_A_SLOW_LINE: f64 = 1.75;
 
-/// The strongest line of what a table leaves, if it is no accident. Lines go up to that which the spacing of stations
-/// resolves, and that one is included: left out, its aliases would stand in for it. Where stations were left out, the
-/// lower quartile of their distances is still the spacing.
+/// The strongest line of what a table leaves, if it is no accident, and after it those of which it may be the alias because
+/// stations stand at uneven distances. Lines go up to that which the spacing of stations resolves, and that one is included:
+/// left out, its aliases would stand in for it.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small positive counts, saturating")]
-pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_turn: f64) -> Option<u32> {
+pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, cycles_per_turn: f64) -> Vec<u32> {
     let reference: Vec<f64> = samples.iter().map(|s| s.reference).collect();
     if span(&reference) < 350f64.to_radians() {
-        return None;
+        return Vec::new();
     }
     let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
-    let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
-    let resolved = std::f64::consts::PI / lower_quartile(&mut steps).max(1e-12) + 0.01;
+    let resolved = std::f64::consts::PI / spacing(&reference).max(1e-12) + 0.01;
     let repeats = span(&reference) > TURNS_OF_A_SLOW_LINE * std::f64::consts::TAU;
     let tried: Vec<u32> = (1..=HIGHEST.min(resolved as u32))
         .filter(|n| !fitted.shape.lines.contains(n))
@@ -42,16 +49,43 @@ pub(crate) fn strongest_line(samples: &[Sample], fitted: &TableFit, cycles_per_t
         .filter(|n| !belongs_to_table(*n, fitted.shape.order, cycles_per_turn))
         .collect();
     if tried.len() < FEWEST {
-        return None;
+        return Vec::new();
     }
     let powers: Vec<f64> = tried.iter().map(|n| power(f64::from(*n), &reference, &left)).collect();
     let mean = median(&mut powers.clone()) / std::f64::consts::LN_2;
-    let (at, strongest) = powers.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    let ratio = strongest / mean;
-    let one_phase = only_phase(f64::from(tried[at]), samples).is_some();
+    let mut ranked: Vec<(u32, f64)> = tried.iter().copied().zip(powers).collect();
+    ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // a comb of stations spreads what is left over a few ordinates: it also has to stand out of the sum of squares
+    let rest = left.iter().map(|e| e * e).sum::<f64>() - 2.0 * ranked[0].1 / left.len() as f64;
+    let ratio = ranked[0].1 / mean.max(rest.max(0.0));
+    let one_phase = only_phase(f64::from(ranked[0].0), samples).is_some();
     let alone = if one_phase { erfc((0.5 * ratio).sqrt()) } else { (-ratio).exp() };
     let by_chance = -(-alone).ln_1p() * tried.len() as f64;
-    (-(-by_chance).exp_m1() < FALSE_ALARM).then(|| tried[at])
+    if -(-by_chance).exp_m1() >= FALSE_ALARM {
+        return Vec::new();
+    }
+    let first = ranked[0];
+    let rivals = ranked.into_iter().filter(|r| r.1 > RIVAL * first.1 && likeness(first.0, r.0, &reference) > RIVAL);
+    rivals.take(MOST_RIVALS).map(|(n, _)| n).collect()
+}
+
+/// How much two lines look alike on these stations: 1 where one is the alias of the other, near 0 where both are resolved.
+fn likeness(a: u32, b: u32, reference: &[f64]) -> f64 {
+    let (a, b) = (f64::from(a), f64::from(b));
+    let mean = |n: f64| power(n, reference, &vec![1.0; reference.len()]).sqrt() / reference.len() as f64;
+    mean(a - b).max(mean(a + b))
+}
+
+/// The step of which all distances between neighbouring stations are multiples. Where stations were left out, the lower
+/// quartile of their distances is still the spacing, or, where they were left out in a pattern, a few times as much.
+fn spacing(reference: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    let usual = lower_quartile(&mut steps);
+    let divides = |parts: &f64| {
+        let unit = usual / parts;
+        steps.iter().all(|s| (s / unit - (s / unit).round()).abs() < OFF_THE_GRID)
+    };
+    (1..=MOST_PARTS).map(f64::from).find(divides).map_or(usual, |parts| usual / parts)
 }
 
 /// Whether a line is a harmonic of the sensor's period that a table of so many harmonics holds, or could.
@@ -91,6 +125,6 @@ mod tests {
             .collect();
         let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![], free_gain: false };
         let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
-        assert_eq!(strongest_line(&samples, &fitted, 1.0), Some(36));
+        assert_eq!(strongest_and_its_aliases(&samples, &fitted, 1.0)[0], 36);
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, cross_validate, losses_of_radius};
 use super::ellipse;
-use super::lines::strongest_line;
+use super::lines::strongest_and_its_aliases;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
@@ -23,10 +23,12 @@ const COARSE_ORDERS: [usize; 2] = [0, 4];
 const MOTION_ORDERS: [usize; 2] = [4, 12];
 /// Lengths offered anew beside an isolated line go up to this.
 const ORDER_BESIDE_LINES: usize = 12;
-/// Observations that a model needs for each of its unknowns, an engineering choice. A row observes the angle, and of two
-/// channels the radius too. A readout alone explains both, so that 17 stations allow offset, gain and skew; beside a table,
-/// which lives in the angle, it has the angle to share: 34 rows allow those and two harmonics.
-const OBSERVATIONS_PER_UNKNOWN: usize = 4;
+/// Observations that a table needs for each of its unknowns, an engineering choice: 27 stations allow four harmonics.
+const OBSERVATIONS_PER_UNKNOWN: usize = 3;
+/// And where a readout is fitted, whose unknowns partly do a table's work. A row observes the angle, and of two channels the
+/// radius too. A readout alone explains both, so that 17 stations allow offset, gain and skew; beside a table, which lives
+/// in the angle, it has the angle to share: 34 rows allow those and two harmonics.
+const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
 /// Rows beyond which selection looks at every so many only.
 const ENOUGH_ROWS: usize = 1500;
 /// Kinds of readout that are offered every length of the table.
@@ -209,7 +211,8 @@ impl<'a> Selection<'a> {
         let of_readout = front.map_or(0, |f| f.0.free().len());
         let alone = of_readout > 0 && *shape == Shape::constant(self.sensor.free_gain);
         let observations = if alone { 2 * rows } else { rows };
-        (of_readout + shape.size() + self.runs.len()) * OBSERVATIONS_PER_UNKNOWN <= observations
+        let each = if of_readout > 0 { OBSERVATIONS_BESIDE_A_READOUT } else { OBSERVATIONS_PER_UNKNOWN };
+        (of_readout + shape.size() + self.runs.len()) * each <= observations
     }
 
     fn fit_without_each_fold(&self, front: Option<Front>) -> Option<WithoutFolds> {
@@ -238,21 +241,30 @@ impl<'a> Selection<'a> {
         fit_from(&self.starts, self.rails, kind, weighting, runs, self.sensor.gain)
     }
 
-    /// The best model with one isolated line more, if it is better by more than a standard error.
+    /// The best model with one isolated line more, if it is better by more than a standard error, also than with a line that
+    /// looks like it on these stations.
     fn with_a_line(&mut self, chosen: &Candidate<Model>) -> Option<Candidate<Model>> {
         let (front, shape) = &chosen.model;
         let readout = front.and_then(|(kind, weighting)| self.fit_readout(kind, weighting, &self.runs));
         let samples = self.sensor.samples(&self.runs, readout.as_ref().map(|f| &f.readout));
         let table = TableFit::new(shape, &samples, self.runs.len(), self.sensor.cycles)?;
-        let line = strongest_line(&samples, &table, self.sensor.cycles_per_turn())?;
         let mut orders: Vec<usize> =
             ORDERS.into_iter().filter(|n| *n <= shape.order.max(ORDER_BESIDE_LINES)).chain([shape.order]).collect();
         orders.sort_unstable();
         orders.dedup();
-        let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
-        let more = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
-        let better = choose(&more, Tolerance::One)?;
-        better.losses.is_better_than(&chosen.losses).then(|| better.clone())
+        let rivals = strongest_and_its_aliases(&samples, &table, self.sensor.cycles_per_turn());
+        let mut with: Vec<Candidate<Model>> = rivals
+            .iter()
+            .filter_map(|line| {
+                let lines: Vec<u32> = shape.lines.iter().copied().chain([*line]).collect();
+                let all = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
+                choose(&all, Tolerance::One).cloned()
+            })
+            .collect();
+        with.sort_by(|a, b| a.losses.rms().total_cmp(&b.losses.rms()));
+        let (best, aliases) = with.split_first()?;
+        let told = |c: &Candidate<Model>| best.losses.is_told_from_its_alias(&c.losses);
+        (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(told)).then(|| best.clone())
     }
 }
 
