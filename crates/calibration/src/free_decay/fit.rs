@@ -45,6 +45,12 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
+    /// The same, with intervals so many times as wide.
+    pub(crate) fn widened(mut self, times: f64) -> Self {
+        self.covariance *= times * times;
+        self
+    }
+
     pub(crate) fn deviation(&self, term: Term) -> f64 {
         let at = self.model.terms.iter().position(|t| *t == term);
         at.map_or(0.0, |at| self.covariance[(at, at)].max(0.0).sqrt())
@@ -228,6 +234,13 @@ impl Fitting<'_> {
             }
         }
     }
+}
+
+/// What a model leaves of the first `count` stretches of a run: along the orbit's amplitude, across it, in quadrature; V.
+pub(crate) fn left(model: &Model, start: &Start, run: &DecayRun, count: usize) -> [Vec<f64>; DIRECTIONS] {
+    let predicted = model.predict(run, start, count);
+    let frames: Vec<Frame> = predicted.iter().map(Frame::of).collect();
+    columns(&frames, |i| run.seen[i] - predicted[i], &vec![false; count])
 }
 
 /// A change of a term that changes the state by about [`NUDGE`] of itself over a run.

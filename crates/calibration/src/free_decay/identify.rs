@@ -1,13 +1,14 @@
 //! The main job for free decays: runs made ready, terms chosen on the fitted part, the held-out part read once, and the
 //! values that leave the program fitted to all that may be fitted.
 
+use super::agreement::{Verdict, verdict};
 use super::errors::{Part, after, raw};
 use super::fit::{Data, Fit, fit};
 use super::model::Start;
 use super::phase::phase;
 use super::report::{Errors, Finding, report};
 use super::runs::DecayRun;
-use super::selection::{choose, is_declared, is_sound};
+use super::selection::{Chosen, choose, is_declared, is_sound};
 use crate::error::Refusal;
 use crate::identification::{Identification, Options, run_report};
 use crate::recording::{Campaign, RunKind};
@@ -79,6 +80,14 @@ impl Head {
             warnings: campaign.all_warnings().map(str::to_owned).collect(),
         }
     }
+
+    /// Says that a run is left out, and why.
+    fn leave_out(&mut self, run: &DecayRun, why: &str) {
+        self.warnings.push(format!("{}: left out: {why}", run.name));
+        if let Some(r) = self.runs.get_mut(run.number) {
+            (r.agrees, r.r#use) = (Some(false), "left out".into());
+        }
+    }
 }
 
 /// Part of a run, in four parts, that is held out where no run is.
@@ -98,13 +107,8 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     if fitted.is_empty() {
         return Err(Refusal::new("campaign", "no decay is left to fit", "a run with use = \"fit\""));
     }
+    let Agreed { fitted, counts, mut chosen, times_as_wide } = agreed(fitted, &held, &mut head, options)?;
     let whole: Vec<usize> = fitted.iter().map(DecayRun::len).collect();
-    let counts: Vec<usize> =
-        if held.is_empty() { whole.iter().map(|n| n * FITTED_QUARTERS / 4).collect() } else { whole.clone() };
-    let data = Data { runs: &fitted, counts: &counts };
-    (options.progress)("fitting the equation of motion");
-    let mut chosen = choose(data, options.discover, options.progress);
-    sound(&chosen.discovered, &head.device)?;
     (options.progress)("measuring the held-out error");
     let declared = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.declared);
     let mut errors = Errors::of(&held, &fitted, &counts, &chosen.declared, &chosen.discovered);
@@ -120,7 +124,10 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     }
     (options.progress)("fitting what was chosen to all stretches");
     let all = Data { runs: &fitted, counts: &whole };
-    let of_all = |f: &Fit| if held.is_empty() { fit(&f.model, &f.starts, all) } else { f.clone() };
+    let of_all = |f: &Fit| {
+        let of_all = if held.is_empty() { fit(&f.model, &f.starts, all) } else { f.clone() };
+        of_all.widened(times_as_wide)
+    };
     let final_fit = of_all(&chosen.discovered);
     sound(&final_fit, &head.device)?;
     let final_declared =
@@ -128,6 +135,50 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
     let finding = Finding { chosen, fit: final_fit, declared: final_declared, phase, errors };
     report(head, &finding, &fitted, &held, with_plots)
+}
+
+/// Runs that agree, with what was chosen from them.
+struct Agreed {
+    fitted: Vec<DecayRun>,
+    /// stretches that may be fitted before errors are measured
+    counts: Vec<usize>,
+    chosen: Chosen,
+    /// intervals are to be so many times as wide, for what the runs differ in
+    times_as_wide: f64,
+}
+
+/// Chooses the terms, and leaves out runs that do not agree with the rest.
+fn agreed(
+    mut fitted: Vec<DecayRun>,
+    held: &[DecayRun],
+    head: &mut Head,
+    options: &Options<'_>,
+) -> Result<Agreed, Refusal> {
+    loop {
+        let quarters = if held.is_empty() { FITTED_QUARTERS } else { 4 };
+        let counts: Vec<usize> = fitted.iter().map(|r| r.len() * quarters / 4).collect();
+        let data = Data { runs: &fitted, counts: &counts };
+        (options.progress)("fitting the equation of motion");
+        let chosen = choose(data, options.discover, options.progress);
+        sound(&chosen.discovered, &head.device)?;
+        let times_as_wide = match verdict(&chosen.discovered, data, options.progress)? {
+            Verdict::Agree => 1.0,
+            Verdict::Wide(times, why) => {
+                head.warnings
+                    .push(format!("{why}: the decays do not agree, and intervals are {times:.0} times as wide"));
+                times
+            }
+            Verdict::Out(odd) => {
+                for (at, why) in &odd {
+                    head.leave_out(&fitted[*at], why);
+                }
+                let mut at = 0..;
+                fitted.retain(|_| at.next().is_none_or(|at| odd.iter().all(|(odd, _)| *odd != at)));
+                continue;
+            }
+        };
+        return Ok(Agreed { fitted, counts, chosen, times_as_wide });
+    }
 }
 
 fn sound(fit: &Fit, device: &str) -> Result<(), Refusal> {

@@ -55,6 +55,18 @@ impl DecayRun {
         self.t_s.len()
     }
 
+    /// Some of its stretches.
+    pub(crate) fn part(&self, of: Range<usize>) -> Self {
+        Self {
+            name: self.name.clone(),
+            t_s: self.t_s[of.clone()].to_vec(),
+            seen: self.seen[of.clone()].to_vec(),
+            rate_rad_s: self.rate_rad_s[of.clone()].to_vec(),
+            envelopes: self.envelopes[of].to_vec(),
+            ..*self
+        }
+    }
+
     pub(crate) fn duration_s(&self) -> f64 {
         self.t_s.last().copied().unwrap_or(0.0) - self.t_s.first().copied().unwrap_or(0.0)
     }

@@ -1,6 +1,7 @@
 //! Decays without any loop, at several starting angles: what they tell of a resonator, and how sure of it they are.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test fails by panicking")]
 
+mod broken;
 mod foucault;
 mod ring;
 
