@@ -152,7 +152,7 @@ impl Losses {
     }
 
     /// So much better than the losses with one of its aliases in its place that it is no accident.
-    pub(crate) fn is_told_from_its_alias(&self, alias: &Self) -> bool {
+    pub(crate) fn is_distinct_from(&self, alias: &Self) -> bool {
         self.is_better_by(NO_ALIAS, alias)
     }
 

@@ -19,10 +19,10 @@ const FEWEST: usize = 8;
 const OF_EVERY_TABLE: usize = 4;
 /// Lines that are nearer than this, per turn, are one.
 const ONE_LINE: f64 = 0.25;
-/// A line is the rival of the strongest where it has this share of its power and is so much like it on these stations.
-const RIVAL: f64 = 0.4;
-/// Lines that are tried, the strongest among them.
-const MOST_RIVALS: usize = 4;
+/// The strongest line may be the alias of one that has this share of its power, and this coherence with it on the stations.
+const ALIAS: f64 = 0.4;
+/// Lines that are tried in its place, itself among them.
+const MOST_ALIASES: usize = 4;
 /// A usual distance of stations is at most so many times their spacing.
 const MOST_PARTS: u32 = 4;
 /// Share of the spacing by which a station may be off the grid: engineering choice.
@@ -65,12 +65,12 @@ pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, c
         return Vec::new();
     }
     let first = ranked[0];
-    let rivals = ranked.into_iter().filter(|r| r.1 > RIVAL * first.1 && likeness(first.0, r.0, &reference) > RIVAL);
-    rivals.take(MOST_RIVALS).map(|(n, _)| n).collect()
+    let aliases = ranked.into_iter().filter(|a| a.1 > ALIAS * first.1 && coherence(first.0, a.0, &reference) > ALIAS);
+    aliases.take(MOST_ALIASES).map(|(n, _)| n).collect()
 }
 
-/// How much two lines look alike on these stations: 1 where one is the alias of the other, near 0 where both are resolved.
-fn likeness(a: u32, b: u32, reference: &[f64]) -> f64 {
+/// Coherence of two lines on the stations: 1 where one is the alias of the other, near 0 where both are resolved.
+fn coherence(a: u32, b: u32, reference: &[f64]) -> f64 {
     let (a, b) = (f64::from(a), f64::from(b));
     let mean = |n: f64| power(n, reference, &vec![1.0; reference.len()]).sqrt() / reference.len() as f64;
     mean(a - b).max(mean(a + b))

@@ -252,18 +252,18 @@ impl<'a> Selection<'a> {
             ORDERS.into_iter().filter(|n| *n <= shape.order.max(ORDER_BESIDE_LINES)).chain([shape.order]).collect();
         orders.sort_unstable();
         orders.dedup();
-        let rivals = strongest_and_its_aliases(&samples, &table, self.sensor.cycles_per_turn());
-        let mut with: Vec<Candidate<Model>> = rivals
-            .iter()
+        let lines = strongest_and_its_aliases(&samples, &table, self.sensor.cycles_per_turn());
+        let mut with: Vec<Candidate<Model>> = lines
+            .into_iter()
             .filter_map(|line| {
-                let lines: Vec<u32> = shape.lines.iter().copied().chain([*line]).collect();
+                let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
                 let all = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
                 choose(&all, Tolerance::One).cloned()
             })
             .collect();
         with.sort_by(|a, b| a.losses.rms().total_cmp(&b.losses.rms()));
         let (best, aliases) = with.split_first()?;
-        let told = |c: &Candidate<Model>| best.losses.is_told_from_its_alias(&c.losses);
+        let told = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
         (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(told)).then(|| best.clone())
     }
 }

@@ -85,8 +85,8 @@ fn without(model: &Model, data: Data<'_>, out: &[usize]) -> Vec<Left> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Verdict {
     Agree,
-    /// these are to be left out, and why
-    Out(Vec<(usize, String)>),
+    /// the rest agree without these
+    Out(Vec<usize>),
     /// they do not agree, and intervals are to be so many times as wide; why
     Wide(f64, String),
 }
@@ -122,8 +122,7 @@ pub(crate) fn verdict(fitted: &Fit, data: Data<'_>, progress: &dyn Fn(&str)) -> 
         return Ok(Verdict::Wide(times, format!("{}: {problem}", data.runs[worst].name)));
     }
     if let Some(out) = odd(&fitted.model, data, alone) {
-        let why = |at: usize| (at, "it does not agree with the other decays, which agree without it".to_owned());
-        return Ok(Verdict::Out(out.into_iter().map(why).collect()));
+        return Ok(Verdict::Out(out));
     }
     if shares().all(|share| share < RELIED_ON) {
         return Ok(Verdict::Wide(times, format!("{}: {problem}", data.runs[worst].name)));

@@ -81,8 +81,9 @@ impl Head {
         }
     }
 
-    /// Says that a run is left out, and why.
-    fn leave_out(&mut self, run: &DecayRun, why: &str) {
+    /// Says that a run is left out.
+    fn leave_out(&mut self, run: &DecayRun) {
+        let why = "it does not agree with the other decays, which agree without it";
         self.warnings.push(format!("{}: left out: {why}", run.name));
         if let Some(r) = self.runs.get_mut(run.number) {
             (r.agrees, r.r#use) = (Some(false), "left out".into());
@@ -169,11 +170,10 @@ fn agreed(
                 times
             }
             Verdict::Out(odd) => {
-                for (at, why) in &odd {
-                    head.leave_out(&fitted[*at], why);
-                }
-                let mut at = 0..;
-                fitted.retain(|_| at.next().is_none_or(|at| odd.iter().all(|(odd, _)| *odd != at)));
+                let (out, rest): (Vec<_>, Vec<_>) =
+                    fitted.into_iter().enumerate().partition(|(at, _)| odd.contains(at));
+                out.iter().for_each(|(_, run)| head.leave_out(run));
+                fitted = rest.into_iter().map(|(_, run)| run).collect();
                 continue;
             }
         };

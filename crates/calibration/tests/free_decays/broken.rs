@@ -38,7 +38,7 @@ fn damaged(angles: &[f64], runs: &[usize], damage: impl Fn(&mut Recording)) -> R
 fn assert_right_without(odd: &[usize], told: Result<Identification, Refusal>) {
     let report = told.unwrap().report;
     for (set, e) in set_values(&report) {
-        assert!((e.value - set).abs() < 2.0 * e.half_width(), "{set}: {e:?}");
+        assert!(is_within(set, &e), "{set}: {e:?}");
     }
     for (at, run) in report.runs.iter().enumerate() {
         let is_odd = odd.contains(&at);
