@@ -1,6 +1,6 @@
 //! Equation 5: unequal detection gains scale the quadrature, so that nulling what is seen nulls what is there.
 
-use cvg_model::DetectionGains;
+use cvg_model::{DetectionGains, Orbit};
 use cvg_tests::domain::{detection_gains, envelopes, line_orbits, orbits};
 use cvg_tests::scalar::{rounded, rounded_envelope};
 use cvg_tests::tolerances::QUADRATURE;
@@ -64,12 +64,16 @@ for_each_scalar! {
 //= specs/equation-05.md#product-of-the-gains
 //= type=test
 //# The measured quadrature MUST be the quadrature times both detection gains.
+/// Of a measured orbit, with which the equation agrees.
 #[test]
 fn snapshot_of_the_measured_over_the_true_quadrature() {
     let mut table = String::from("mismatch_percent  Qd_over_Q  (G_Dx = 1)\n");
     for percent in [-5.0, -1.32, 0.0, 0.5, 1.32, 5.0] {
         let g = DetectionGains { x: 1.0, y: 1.0 + percent / 100.0 };
-        table += &format!("{percent:16.2}{:11.4}\n", g.measured_quadrature(1.0_f64));
+        let e = Orbit { a: 1.0, q: 0.2, theta: 0.4, delta: 0.1 }.envelope();
+        let ratio: f64 = g.measure(&e).pendulum().q / e.pendulum().q;
+        approx::assert_relative_eq!(g.measured_quadrature(1.0), ratio, max_relative = 1e-13);
+        table += &format!("{percent:16.2}{ratio:11.4}\n");
     }
     insta::assert_snapshot!(table);
 }

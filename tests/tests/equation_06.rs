@@ -127,6 +127,7 @@ fn a_line_orbit_with_quadrature_has_more_energy_than_the_equation_says() {
 //= specs/equation-06.md#energy-of-the-measured-orbit
 //= type=test
 //# The measured energy MUST be the energy of the measured envelope.
+/// Of a measured line, with which the equation agrees.
 #[test]
 fn snapshot_of_the_measured_over_the_true_energy() {
     let mismatches = [-1.32, 0.5, 1.32, 5.0];
@@ -134,7 +135,10 @@ fn snapshot_of_the_measured_over_the_true_energy() {
     for theta_deg in (0..=180_i32).step_by(15) {
         let row = mismatches.map(|m| {
             let g = DetectionGains { x: 1.0, y: 1.0 + m / 100.0 };
-            format!("{:10.6}", g.measured_energy(1.0, f64::from(theta_deg).to_radians()))
+            let theta = f64::from(theta_deg).to_radians();
+            let energy: f64 = g.measure(&Envelope::new(theta.cos(), 0.0, theta.sin(), 0.0)).pendulum().e;
+            approx::assert_relative_eq!(g.measured_energy(1.0, theta), energy, max_relative = 1e-13);
+            format!("{energy:10.6}")
         });
         table += &format!("{theta_deg:9}{}\n", row.concat());
     }

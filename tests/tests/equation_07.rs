@@ -193,6 +193,12 @@ fn paper_1_32_percent_bends_the_angle_by_0_376_degrees() {
     assert!((bound_deg - 0.3757).abs() < 5e-5, "{bound_deg}");
 }
 
+/// How far the angle of a measured line is from that of the line, rad: without the equation.
+fn error_of_a_line(g: f64, theta: f64) -> f64 {
+    let line = Envelope::new(theta.cos(), 0.0, theta.sin(), 0.0);
+    wrapped(DetectionGains { x: 1.0, y: g }.measure(&line).pendulum().angle() - theta, PI)
+}
+
 //= specs/equation-07.md#closed-form-of-the-error
 //= type=test
 //# The error MUST be the measured angle less the true angle up to a multiple of 360°.
@@ -204,12 +210,19 @@ fn snapshot_of_figure_2() {
     let mut table = format!("theta_deg{}\n", mismatches.map(|m| format!("{:>9}", format!("{m:+.2}%"))).concat());
     for theta_deg in (-90..=90_i32).step_by(15) {
         let row = mismatches.map(|m| {
-            let error = angle_error(1.0 + m / 100.0, f64::from(theta_deg).to_radians()).to_degrees();
-            format!("{error:9.4}").replace("-0.0000", " 0.0000")
+            let (g, theta) = (1.0 + m / 100.0, f64::from(theta_deg).to_radians());
+            let error = error_of_a_line(g, theta);
+            approx::assert_abs_diff_eq!(angle_error(g, theta), error, epsilon = 1e-13);
+            format!("{:9.4}", error.to_degrees()).replace("-0.0000", " 0.0000")
         });
         table += &format!("{theta_deg:9}{}\n", row.concat());
     }
-    let bounds = mismatches.map(|m| format!("{:9.4}", angle_error_bound(1.0 + m / 100.0).to_degrees()));
+    let bounds = mismatches.map(|m| {
+        let g = 1.0 + m / 100.0;
+        let most = (0..=9_000).map(|k| error_of_a_line(g, f64::from(k) * 1e-4).abs()).fold(0.0, f64::max);
+        approx::assert_relative_eq!(angle_error_bound(g), most, max_relative = 1e-7);
+        format!("{:9.4}", most.to_degrees())
+    });
     table += &format!("    bound{}\n", bounds.concat());
     insta::assert_snapshot!(table);
 }

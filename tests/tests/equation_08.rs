@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use cvg_model::actuation::misaligned_forces;
 use cvg_model::resonator::Anisotropy;
 use cvg_model::resonator::Resonator;
-use cvg_model::{ActuationGains, ControlOutputs, Orbit};
+use cvg_model::{ActuationGains, ControlOutputs, Envelope, Orbit};
 use cvg_tests::domain::{angles, outputs, sizes};
 use cvg_tests::scalar::rounded;
 use cvg_tests::tolerances::MISALIGNED_FORCES;
@@ -154,8 +154,13 @@ fn snapshot_of_what_leaks_at_the_worst_angle() {
     for percent in [-1.32, 0.5, 1.32, 5.0] {
         let g: f64 = 1.0 + percent / 100.0;
         let worst = 0.5 * ((g - 1.0) / (g + 1.0)).acos();
-        let error = cvg_model::detection::angle_error(g, worst);
-        let f = misaligned_forces(1.0, &ControlOutputs { v_as: 1.0, v_qc: 0.0 }, error);
+        // at the angle that is measured, seen along the line that is there
+        let seen: f64 = Envelope::new(worst.cos(), 0.0, g * worst.sin(), 0.0).pendulum().angle();
+        let v = ControlOutputs { v_as: 1.0, v_qc: 0.0 };
+        let (error, f) = (seen - worst, ActuationGains { x: 1.0, y: 1.0 }.axis_forces(&v, seen).along_orbit(worst));
+        let leak = misaligned_forces(1.0, &v, cvg_model::detection::angle_error(g, worst));
+        approx::assert_abs_diff_eq!(leak.a_s, f.a_s, epsilon = 1e-13);
+        approx::assert_abs_diff_eq!(leak.q_s, f.q_s, epsilon = 1e-13);
         table += &format!("{percent:16.2}{:17.4}{:17.6}{:17.6}\n", error.to_degrees(), f.a_s, f.q_s);
     }
     insta::assert_snapshot!(table);

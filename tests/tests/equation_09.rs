@@ -160,8 +160,16 @@ fn snapshot_of_the_forces_around_a_turn() {
     let v = ControlOutputs { v_as: -1.0, v_qc: 0.1 };
     let mut table = String::from("theta_deg      f_xc      f_xs      f_yc      f_ys\n");
     for theta_deg in (0..=180_i32).step_by(30) {
-        let f = gains.axis_forces(&v, f64::from(theta_deg).to_radians());
-        let row = [f.x_c, f.x_s, f.y_c, f.y_s].map(|v| format!("{v:10.5}").replace("-0.00000", " 0.00000"));
+        let theta = f64::from(theta_deg).to_radians();
+        // the axes are those of an orbit, which has the same forces on it
+        let axes = Orbit { a: 1.0, q: 1.0, theta, delta: 0.0 }.envelope();
+        let [x, y] = [gains.x, gains.y];
+        let shares = [x * v.v_qc * axes.x_s, x * v.v_as * axes.x_c, y * v.v_qc * axes.y_s, y * v.v_as * axes.y_c];
+        let f = gains.axis_forces(&v, theta);
+        for (force, share) in [f.x_c, f.x_s, f.y_c, f.y_s].into_iter().zip(shares) {
+            approx::assert_abs_diff_eq!(force, share, epsilon = 1e-15);
+        }
+        let row = shares.map(|v| format!("{v:10.5}").replace("-0.00000", " 0.00000"));
         table += &format!("{theta_deg:9}{}\n", row.concat());
     }
     insta::assert_snapshot!(table);

@@ -134,7 +134,11 @@ fn snapshot_of_the_energy_force_and_what_leaks() {
         for theta_deg in (0..=180_i32).step_by(45) {
             let gains = ActuationGains { x: ratio, y: 1.0 };
             let theta = f64::from(theta_deg).to_radians();
-            let f = gains.orbit_forces(&ControlOutputs { v_as: 1.0, v_qc: 0.0 }, theta);
+            let v = ControlOutputs { v_as: 1.0, v_qc: 0.0 };
+            let f = gains.axis_forces(&v, theta).along_orbit(theta);
+            let short = gains.orbit_forces(&v, theta);
+            approx::assert_abs_diff_eq!(short.a_s, f.a_s, epsilon = 1e-15);
+            approx::assert_abs_diff_eq!(short.q_s, f.q_s, epsilon = 1e-15);
             let leak = format!("{:18.5}", f.q_s).replace("-0.00000", " 0.00000");
             table += &format!("{ratio:9.4}{theta_deg:11}{:18.5}{leak}\n", f.a_s);
         }
