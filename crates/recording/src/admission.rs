@@ -94,6 +94,13 @@ fn convert(
         } else {
             naming.unit(channel).map_or(Conversion::NONE, |(_, by)| by)
         };
+        let is_stated = naming.factor(channel).is_some() || own.is_some() || naming.unit(channel).is_some();
+        let counted = column.values.iter().copied().find(|value| value.is_finite());
+        if let (Channel::Time, false, Some((unit, by))) = (channel, is_stated, counted.and_then(units::since_1970)) {
+            warnings.push(format!("`{channel}` counts {unit} since 1970, and is taken to s"));
+            column.values.iter_mut().for_each(|value| *value = by.of(*value));
+            continue;
+        }
         if by == Conversion::NONE {
             continue;
         }

@@ -23,6 +23,7 @@ mod naming;
 mod open;
 mod parquet;
 mod requirement;
+mod stamp;
 mod table;
 mod units;
 mod unknown;

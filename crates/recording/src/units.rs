@@ -31,6 +31,17 @@ impl Conversion {
 const ICE_K: f64 = 273.15;
 const RADIAN_DEG: f64 = 180.0 / std::f64::consts::PI;
 
+/// Seconds since 1970 are fewer until the year 5138, and milliseconds are more since March 1973.
+const FEWER_SECONDS: f64 = 1e11;
+
+/// The unit of a time without one that is counted since 1970 in parts of a second, by how many they are.
+pub(crate) fn since_1970(time: f64) -> Option<(&'static str, Conversion)> {
+    [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3)]
+        .into_iter()
+        .find(|(_, factor)| time >= 1e-3 * FEWER_SECONDS / factor)
+        .map(|(unit, factor)| (unit, Conversion::by(factor)))
+}
+
 /// The conversion of a unit to a channel's; `None` where it is not known to be one of this kind.
 pub(crate) fn conversion(channel: Channel, unit: &str) -> Option<Conversion> {
     let unit = plain(unit);

@@ -198,6 +198,37 @@ fn an_hdf5_file_is_read_by_its_datasets() {
 }
 
 #[test]
+fn times_of_an_hdf5_file_may_be_dates() {
+    let mut file = hdf5_pure::FileBuilder::new();
+    let texts = ["2026-03-01T12:00:00", "2026-03-01T12:00:00.1", "2026-03-01T12:00:00.2"];
+    file.create_dataset("when").with_vlen_strings(&texts);
+    file.create_dataset("theta").with_f64_data(&[0.0, 10.0, 20.0]);
+    file.create_dataset("rate_dps").with_f64_data(&[100.0; 3]);
+    file.create_dataset("operator").with_vlen_strings(&["A", "B", "C"]);
+    let bytes = file.finish().unwrap();
+    let names = naming(&["t_s=when", "theta_deg=theta"]);
+    let recording = Recording::read_from(bytes.as_slice(), &names, Path::new("a.h5")).unwrap();
+    assert_eq!(recording.t_s, [0.0, 0.1, 0.2]);
+    assert!(recording.warnings.iter().any(|w| w.contains("times are written as dates")), "{:?}", recording.warnings);
+    // what could be the time is named where none is mapped
+    let said = Recording::read_from(bytes.as_slice(), Naming::NONE, Path::new("a.h5")).unwrap_err().to_string();
+    assert!(said.contains("`when`"), "{said}");
+}
+
+#[test]
+fn times_counted_since_1970_are_taken_to_seconds() {
+    for (parts, unit) in [(1.0, ""), (1e3, "ms"), (1e6, "us"), (1e9, "ns")] {
+        let text = (0..3).fold("t_s,rate_dps,theta_deg\n".to_owned(), |text, row| {
+            format!("{text}{:.0},100,{}\n", parts * (1.777_888_8e9 + f64::from(row)), 8 * row)
+        });
+        let recording = Recording::parse_csv(text.as_bytes(), Path::new("a.csv")).unwrap();
+        assert!((recording.t_s[2] - recording.t_s[0] - 2.0).abs() < 1e-6, "{unit}: {:?}", recording.t_s);
+        let said = format!("`t_s` counts {unit} since 1970");
+        assert_eq!(recording.warnings.iter().any(|w| w.contains(&said)), !unit.is_empty(), "{:?}", recording.warnings);
+    }
+}
+
+#[test]
 fn damaged_containers_are_refused_with_their_name() {
     let times = || matrix("t_s", [3, 1], &[0.0, 0.1, 0.2]);
     for bytes in [hdf5(), mat_5(&[times()]), mat_5(&[structure("s", &["t_s", "x"], &[times(), times()])])] {

@@ -10,10 +10,13 @@ use crate::channel::Channel;
 use crate::error::ReadError;
 use crate::memory::{self, PER_NUMBER, PER_TEXT};
 use crate::naming::Naming;
+use crate::stamp::{self, Stamp};
 
 const KIND: &str = "an HDF5 file";
 /// Groups within groups that are looked into.
 const DEEPEST_GROUP: usize = 8;
+/// Most bytes of a date with its time.
+const LONGEST_DATE: usize = 64;
 
 /// A data set that may be a column.
 struct Listed {
@@ -24,11 +27,16 @@ struct Listed {
 /// Reads a recording from the bytes of an HDF5 file.
 pub(super) fn read(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let damaged = || refuse(source, KIND, "the file is damaged".to_owned());
-    let arrays = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
-    admission::admit(table(arrays, naming, source)?, naming, source)
+    let (arrays, is_dated) = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
+    let mut table = table(arrays, naming, source)?;
+    if is_dated {
+        table.warnings.push(stamp::COUNTED.to_owned());
+    }
+    admission::admit(table, naming, source)
 }
 
-fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Vec<Named>, ReadError> {
+/// The arrays of a file, and whether the time is one of dates.
+fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>, bool), ReadError> {
     let say = |error: hdf5_pure::Error| refuse(source, KIND, error.to_string());
     let held = bytes.len() as u64;
     let file = hdf5_pure::File::from_bytes(bytes).map_err(say)?;
@@ -49,18 +57,37 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Vec<Named>, 
         needed = needed.saturating_add(values.saturating_mul(PER_NUMBER + PER_TEXT + element));
         memory::allow(needed.saturating_add(part.saturating_mul(2 * element)), "its arrays", source)?;
     }
-    let mut arrays = Vec::new();
+    let (mut arrays, mut is_dated) = (Vec::new(), false);
     for ((array, name), unneeded) in listed.iter().zip(&names).zip(unneeded) {
         if let Some(why) = unneeded {
             arrays.push((name.clone(), Err(why)));
             continue;
         }
-        // texts and compounds are no columns
-        let values = file.dataset(&array.path).map_err(say)?.read_f64().ok();
+        // texts that are no dates, and compounds, are no columns
+        let dataset = file.dataset(&array.path).map_err(say)?;
+        let mut values = dataset.read_f64().ok();
+        if values.is_none() {
+            values = dates(&dataset);
+            is_dated |= values.is_some() && naming.channel(name) == Some(Channel::Time);
+        }
         let size: Vec<usize> = array.size.iter().map(|&n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
         push(&mut arrays, name, &size, values, false);
     }
-    Ok(arrays)
+    Ok((arrays, is_dated))
+}
+
+/// Texts that are all dates, as seconds from the first.
+fn dates(dataset: &hdf5_pure::Dataset) -> Option<Vec<f64>> {
+    let count = usize::try_from(dataset.shape().ok()?.into_iter().fold(1, u64::saturating_mul)).ok()?;
+    let most = count.checked_mul(LONGEST_DATE)?;
+    // those of any length say it in what they refer to
+    let texts = match dataset.vlen_string_payload_size() {
+        Ok(bytes) if bytes > most as u64 => return None,
+        Err(_) if dataset.element_size().ok()? > LONGEST_DATE as u64 => return None,
+        _ => dataset.read_string().ok()?,
+    };
+    let first = Stamp::of(texts.first()?.as_bytes())?;
+    texts.iter().map(|text| first.seconds_to(text.as_bytes())).collect()
 }
 
 fn look_through(

@@ -2,9 +2,9 @@
 
 use super::cell::{self, Cell, Decimal};
 use super::head::{Head, split};
-use super::stamp::Stamp;
 use crate::channel::Channel;
 use crate::layout::Field;
+use crate::stamp::Stamp;
 use crate::units;
 
 /// The units of channels, where a line holds them: no number where one belongs, and a word in one of these places at

@@ -13,7 +13,6 @@ mod piece;
 mod plain;
 mod preamble;
 mod record;
-mod stamp;
 mod write;
 
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -26,7 +25,6 @@ use self::blocks::{Block, BlockError, Blocks, LONGEST_LINE};
 use self::cell::{Cell, Decimal};
 use self::piece::{Dialect, Piece};
 use self::record::{Record, RecordError, Records};
-use self::stamp::Stamp;
 use super::Recording;
 use super::admission;
 use super::channel::Channel;
@@ -34,6 +32,7 @@ use super::error::ReadError;
 use super::layout::Field;
 use super::naming::Naming;
 use super::table::{Missing, Table};
+use crate::stamp::{self, Stamp};
 
 /// How much text is taken at a time.
 #[derive(Debug, Clone, Copy)]
@@ -124,7 +123,7 @@ fn read_table(
                 wanted: "the mapping without a factor",
             });
         }
-        head.warnings.push("times are written as dates: `t_s` is counted from the first, in s".to_owned());
+        head.warnings.push(stamp::COUNTED.to_owned());
     }
     let mut assembly = Assembly::new(dialect, source, head.header_line, head.next_line);
     let mut bytes_parsed = 0;

@@ -4,9 +4,9 @@
 //! row that is too short is held back here and judged in `assembly.rs`.
 
 use super::cell::{self, Cell, Decimal};
-use super::stamp::Stamp;
 use crate::channel::Channel;
 use crate::layout::{Field, Layout};
+use crate::stamp::Stamp;
 use crate::table::Missing;
 use crate::unknown::Cells;
 

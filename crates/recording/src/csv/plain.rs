@@ -7,8 +7,8 @@ use std::ops::Range;
 use super::cell::{self, Decimal};
 use super::digits::plain_number;
 use super::piece::{Dialect, Piece};
-use super::stamp::Stamp;
 use crate::layout::Field;
+use crate::stamp::Stamp;
 
 /// Reads the whole lines of `text[range]` into a piece. What is behind the range is looked at and not used.
 ///

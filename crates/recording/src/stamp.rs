@@ -10,16 +10,19 @@ const WITH_OFFSET: &str = "%Y-%m-%dT%H:%M:%S%.f%#z";
 /// Bytes of the day.
 const DAY: usize = 10;
 
+/// What a reader says that found dates in the place of times.
+pub(crate) const COUNTED: &str = "times are written as dates: `t_s` is counted from the first, in s";
+
 /// An instant, of UTC where it says its offset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stamp {
+pub(crate) struct Stamp {
     at: NaiveDateTime,
     has_offset: bool,
 }
 
 impl Stamp {
     /// `2026-03-01T12:00:00.25+01:00`, the `T` a blank and the point a comma if so, the offset `Z` or absent.
-    pub(super) fn of(cell: &[u8]) -> Option<Self> {
+    pub(crate) fn of(cell: &[u8]) -> Option<Self> {
         let text = std::str::from_utf8(cell).ok().map(str::trim).filter(|text| text.is_ascii())?;
         let (day, time) = text.split_at_checked(DAY)?;
         let time = time.strip_prefix(['T', 't', ' '])?;
@@ -33,7 +36,7 @@ impl Stamp {
     }
 
     /// Seconds from this one to that in a cell; `None` where the cell has none of the same kind.
-    pub(super) fn seconds_to(self, cell: &[u8]) -> Option<f64> {
+    pub(crate) fn seconds_to(self, cell: &[u8]) -> Option<f64> {
         let other = Self::of(cell).filter(|other| other.has_offset == self.has_offset)?;
         let since: TimeDelta = other.at - self.at;
         Some(since.num_seconds() as f64 + f64::from(since.subsec_nanos()) * 1e-9)
