@@ -365,6 +365,9 @@ fn what_rust_refuses_c_is_refused_with_its_name() {
     of(|s| s.dac_limit_v = f64::NAN);
     of(|s| s.window = 0);
     of(|s| s.amplitude_v = 1e9);
+    // what acts through a sum alone is told apart by its name
+    of(|s| s.readout_delay_s = -1e-6);
+    of(|s| s.drive_delay_s = -1e-6);
     let name = CString::new("no-such-effect").expect("no zero");
     let effect = Effect { id: name.as_ptr(), values: [0.0; 4] };
     let settings = Settings { readout: &raw const effect, readout_count: 1, ..in_c(&Rust::default()) };

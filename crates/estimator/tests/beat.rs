@@ -2,6 +2,7 @@
 
 use approx::assert_abs_diff_eq;
 use cvg_estimator::Beat;
+use cvg_estimator::beat::phase_ahead;
 use cvg_model::{Envelope, Orbit};
 
 /// X = x_c − i x_s and Y likewise.
@@ -70,4 +71,17 @@ fn nothing_is_known_from_less_than_two_windows_or_from_no_number() {
     assert_eq!(beat_of(&[e]).radians_per_window(), 0.0);
     assert_eq!((beat_of(&[]).windows(), beat_of(&[e]).windows()), (0, 1));
     assert_eq!(beat_of(&[e, Envelope::new(f64::NAN, 0.0, 0.0, 0.0)]).radians_per_window(), 0.0);
+}
+
+#[test]
+fn the_phase_ahead_is_that_of_the_orbit_in_every_quadrant() {
+    for theta in [0.0, 0.7, 1.5, 2.4, -0.6] {
+        for (a, q) in [(1.0, 0.0), (0.6, 0.3), (0.8, -0.5)] {
+            for delta in [-1.5, -0.9, -0.2, 0.0, 0.4, 1.1, 1.57_f64] {
+                let (cos, sin) = phase_ahead(&Orbit { a, q, theta, delta }.envelope());
+                assert_abs_diff_eq!(cos, delta.cos(), epsilon = 1e-14);
+                assert_abs_diff_eq!(sin, delta.sin(), epsilon = 1e-14);
+            }
+        }
+    }
 }

@@ -266,3 +266,25 @@ fn a_value_in_a_place_that_no_parameter_uses_is_refused_whatever_its_sign() {
         }
     }
 }
+
+#[test]
+fn a_value_on_its_bound_is_taken_and_one_beyond_either_is_refused_by_name() {
+    for id in readout_effects() {
+        let parameters = id.description().parameters;
+        for (place, parameter) in parameters.iter().enumerate() {
+            let with = |value: f64| {
+                let mut values = [0.0; 4];
+                for (slot, p) in values.iter_mut().zip(parameters) {
+                    *slot = p.neutral.clamp(p.lower, p.upper);
+                }
+                values[place] = value;
+                Compensation::<f64, 1>::new(&[(id, values)]).map(|_| ()).map_err(|e| e.parameter)
+            };
+            for (bound, outward) in [(parameter.lower, -1.0), (parameter.upper, 1.0)] {
+                assert_eq!(with(bound), Ok(()), "{id:?} {bound}");
+                let beyond = bound + outward * 1e-9 * bound.abs().max(1.0);
+                assert_eq!(with(beyond), Err(parameter.name), "{id:?} {beyond}");
+            }
+        }
+    }
+}

@@ -220,6 +220,19 @@ fn the_direction_is_turned_ahead_by_the_lead() {
     }
 }
 
+/// The state may hold anything: what is beyond a jump leads as a jump does, what is no number not at all.
+#[test]
+fn a_motion_beyond_a_jump_leads_no_farther_than_one() {
+    let now = Direction { cos: 0.6, sin: 0.8, status: Status::Valid };
+    let led = |sin_2_per_window| tracker().ahead(&PrecessionState { sin_2_per_window, ..Default::default() }, &now);
+    let jump = (2.0 * (FASTEST_RAD_S * WINDOW_S + LEAST_JUMP_RAD)).sin();
+    for beyond in [1.01 * jump, 1.0, 1e30, f64::INFINITY] {
+        assert_eq!(led(beyond), led(jump), "{beyond}");
+        assert_eq!(led(-beyond), led(-jump), "{beyond}");
+    }
+    assert_eq!(led(f64::NAN), now);
+}
+
 #[test]
 fn parameters_outside_their_domain_are_refused_by_name() {
     let good = [WINDOW_S, SMOOTHING_S, FASTEST_RAD_S, LEAST_JUMP_RAD, 0.75, LEAST_V];

@@ -11,6 +11,7 @@ mod estimator;
 mod instrument;
 mod model;
 mod single;
+mod slips;
 mod unseen;
 
 use std::collections::BTreeSet;
@@ -57,6 +58,7 @@ fn library() -> Vec<Fault> {
         edges::FAULTS,
         unseen::FAULTS,
         single::FAULTS,
+        slips::FAULTS,
     ]
     .concat()
 }

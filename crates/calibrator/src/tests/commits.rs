@@ -8,7 +8,7 @@ use crate::state::{Commit, State};
 use crate::ud::{Ud, Update};
 
 /// A filter that took some measurements, so that everything hangs together.
-fn correlated(variance: f64) -> Ud<f64> {
+pub(super) fn correlated(variance: f64) -> Ud<f64> {
     let mut ud = Ud::diagonal(variance);
     for k in 0..6 {
         let h: [f64; N] = core::array::from_fn(|j| ((j * 7 + k * 5) % 11) as f64 / 11.0 - 0.4);

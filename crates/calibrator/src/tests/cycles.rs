@@ -302,6 +302,66 @@ fn a_parameter_a_cycle_may_have_wandered_while_it_is_better_known_than_expected(
     }
 }
 
+/// Whatever hangs together: a parameter that wanders takes no other with it, and is related to none by it.
+#[test]
+fn what_wanders_moves_its_own_variance_and_no_covariance() {
+    let c = calibrator();
+    for j in 0..N {
+        let mut s = busy();
+        s.filter.ud = super::commits::correlated(0.01);
+        s.filter.growing = j;
+        let before = covariance(&s);
+        for k in 65..77 {
+            c.grow(&mut s, k == 65);
+        }
+        let wander = P::ALL[j].wander::<f64>() / P::ALL[j].expected::<f64>();
+        // far more than there is to see: the update is checked, not the number
+        let q = wander * wander * 0.04 * 19.0;
+        let after = covariance(&s);
+        for i in 0..N {
+            for k in 0..N {
+                let grown = if i == j && k == j { q } else { 0.0 };
+                near(after[i][k] - before[i][k], grown, 1e-5 * q + 1e-17);
+            }
+        }
+    }
+}
+
+/// Rotation makes what the model neglects: 3e-5 of its rate, squared.
+#[test]
+fn rotation_adds_to_the_noise_by_the_square_of_its_rate() {
+    let c_ = calibrator();
+    for rate in [0.0, 0.3, -2.0, 5.0] {
+        let mut s = busy();
+        (s.schedule.excited, s.schedule.rate) = (true, rate);
+        for k in 0..7 {
+            c_.measure(&mut s, 0, k);
+        }
+        let expected = s.filter.noise[0] + 3e-6 * 3e-6 + 9e-10 * rate * rate;
+        near(1.0 / s.filter.update.inverse(), expected, 1e-16);
+    }
+}
+
+/// What a commit on trial is worth: how much likelier it made what was seen after it.
+#[test]
+fn a_trial_is_scored_by_the_likelihood_of_what_is_seen_with_it_and_without() {
+    let c_ = calibrator();
+    for sign in [1.0, -1.0] {
+        let mut s = busy();
+        s.trial = core::array::from_fn(|j| sign * 0.01 * j as f64);
+        let would = dot(&s.filter.shown[2], &s.trial);
+        let (h, p) = (s.filter.shown[2], covariance(&s));
+        let e = s.filter.seen[2] - dot(&h, &s.filter.mean);
+        for k in 0..7 {
+            c_.measure(&mut s, 2, k);
+        }
+        let spread: f64 = (0..N).map(|i| (0..N).map(|j| h[i] * p[i][j] * h[j]).sum::<f64>()).sum();
+        let all = spread + 1.0 / s.filter.update.inverse();
+        let without = e + would;
+        near(s.score, 0.5 * (without * without - e * e) / all, 1e-12);
+    }
+}
+
 /// What the loops see of a device at rest.
 fn calm(i: usize) -> (Pendulum<f64>, (f64, f64), Commands<f64>) {
     let theta = 1e-3 * i as f64;
@@ -440,6 +500,11 @@ fn what_goes_on_is_told() {
     for (sigma, known) in [(0.13, true), (0.1307, true), (0.131, false)] {
         s.filter.ud = crate::ud::Ud::diagonal(sigma * sigma);
         assert_eq!(told(&s).detection_known, known, "{sigma}");
+        // by rotation within the last 20 seconds, of cycles of 40 ms
+        for (untold, is_recent) in [(0, true), (499, true), (500, false), (501, false)] {
+            s.schedule.untold = untold;
+            assert_eq!(told(&s).detection_followed, known && is_recent, "{sigma}, {untold}");
+        }
     }
     let ratio = s.estimate(P::DetectionRatio).expect("told");
     near(ratio.value, 0.03 * s.filter.mean[P::DetectionRatio as usize], 1e-15);

@@ -430,19 +430,40 @@ fn what_is_no_rotation_is_what_is_known_of_the_angle_but_its_constant_rate() {
     for (p, value) in MECHANICAL.iter().zip([0.05, 0.011, -0.017, 1.3, -2.1, 0.06, 0.0]) {
         state.correction.known[*p as usize] = value;
     }
-    for theta in angles() {
-        let e = orbit(1.5, 0.01, theta);
+    for (theta, epsilon) in angles().flat_map(|theta| [(theta, 0.01), (theta, -0.01)]) {
+        let e = orbit(1.5, epsilon, theta);
         let p = e.pendulum();
         let commands = Commands { energy_v: -0.2, precession_v: 0.3, quadrature_v: 0.1 };
         let got = c.not_rotation(&state, &p, (theta.cos(), theta.sin()), &commands);
         let a = 1.5 / 1.6;
         let (sin_2, cos_2) = (2.0 * theta).sin_cos();
         let pushed = push(0.2, -0.3, 0.1, 0.0).over(2.5 / 1.6 / a);
-        let [_, expected, _] = known_rates(&pushed, 0.01, (cos_2, sin_2), &state.correction.known);
+        let [_, expected, _] = known_rates(&pushed, epsilon, (cos_2, sin_2), &state.correction.known);
         near(got, expected, 1e-5);
         // a phase that the loop has not nulled turns a command of quadrature into one of precession
         let ahead = Pendulum { l: -2.0 * 0.01 * p.e, ..p };
         let turned = c.not_rotation(&state, &ahead, (theta.cos(), theta.sin()), &commands) - got;
         near(turned, -0.01 * 0.1 * 2.5 / 1.6 / a, 1e-6);
     }
+}
+
+/// A skew of the readout has the phase of Y, one of the drives the mean of the phases of both.
+#[test]
+fn skews_in_phase_have_the_phases_of_what_they_are_skews_of() {
+    let drives = Matrix {
+        xx: Complex::new(1.1, 0.022),
+        xy: Complex::new(0.05, 0.0),
+        yx: Complex::new(-0.08, 0.0),
+        yy: Complex::new(0.9, -0.054),
+    };
+    let correction = Correction::of([0.0; N], Complex::new(1.02, -0.051), Complex::new(0.03, 0.0), drives);
+    let turned = correction.and_then(|c| c.skews_in_phase()).expect("a device");
+    let slope = |z: Complex<f64>| z.im / z.re;
+    near(slope(turned.y_of_x), -0.05, 1e-15);
+    for z in [turned.drives.xy, turned.drives.yx] {
+        near(slope(z), 0.5 * (0.02 - 0.06), 1e-15);
+    }
+    // what is in phase with itself stays
+    assert_eq!((turned.y_of_x.re, turned.drives.xy.re, turned.drives.yx.re), (0.03, 0.05, -0.08));
+    assert_eq!((turned.drives.xx, turned.drives.yy), (drives.xx, drives.yy));
 }
