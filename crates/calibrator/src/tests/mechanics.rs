@@ -467,3 +467,52 @@ fn skews_in_phase_have_the_phases_of_what_they_are_skews_of() {
     assert_eq!((turned.y_of_x.re, turned.drives.xy.re, turned.drives.yx.re), (0.03, 0.05, -0.08));
     assert_eq!((turned.drives.xx, turned.drives.yy), (drives.xx, drives.yy));
 }
+
+/// A cubic c makes z = x(1 + c|x|²) of x: undone up to its third power.
+#[test]
+fn a_cubic_in_force_is_undone_to_second_order() {
+    let c = calibrator();
+    let mut state = c.start();
+    for m in [0.01, -0.01] {
+        state.correction.known[P::Cubic as usize] = m;
+        // X and Y as large as the set amplitude, each in a phase of its own
+        let (x, y) = (Complex::new(1.6 * 0.6, 1.6 * 0.8), Complex::new(1.6, 0.0));
+        let bent = |z: Complex<f64>| Complex::new(z.re * (1.0 + m), z.im * (1.0 + m));
+        let straight = c.readout(&state, &envelope((bent(x), bent(y))));
+        let (found_x, found_y) = phasors(&straight);
+        for (found, there) in [(found_x.re, x.re), (found_x.im, x.im), (found_y.re, y.re), (found_y.im, y.im)] {
+            near(found, there, 25.0 * f64::abs(m * m * m));
+        }
+    }
+}
+
+#[test]
+fn a_phase_that_is_not_nulled_turns_every_push_as_a_phasor() {
+    let c = calibrator();
+    let commands = Commands { energy_v: -0.2, precession_v: 0.3, quadrature_v: 0.1 };
+    let of = |lead: f64| c.push(&Pendulum { e: 1.0, q: 0.0, r: 1.0, s: 0.0, l: -2.0 * lead }, &commands);
+    let still = of(0.0);
+    for lead in [1e-4_f64, -1e-4] {
+        let (sin, cos) = lead.sin_cos();
+        let turned = of(lead);
+        near(turned.along, still.along * cos, 1e-7);
+        near(turned.across, still.along * sin, 1e-7);
+        near(turned.aside, still.aside * cos - still.quadrature * sin, 1e-7);
+        near(turned.quadrature, still.quadrature * cos + still.aside * sin, 1e-7);
+    }
+}
+
+#[test]
+fn what_is_told_of_the_detection_is_what_is_in_force_and_what_was_learned_since() {
+    let mut values = [0.0; N];
+    let told = [(P::DetectionRatio, 0.02), (P::DetectionPhase, -0.015), (P::DetectionSkew, 0.004)];
+    for (p, value) in told {
+        values[p as usize] = value;
+    }
+    let mut state = calibrator().start_from(&values).expect("a device");
+    for (p, value) in told {
+        near(state.estimate(p).expect("told").value, value, 1e-12);
+        state.filter.mean[p as usize] = 0.1;
+        near(state.estimate(p).expect("told").value, value + 0.1 * p.expected::<f64>(), 1e-12);
+    }
+}
