@@ -114,8 +114,6 @@ const WIDEST: f64 = 1e6;
 const CONVERGED: f64 = 0.02;
 /// A step that moves the angle by δ rad misses by less than this times δ, as a share of itself.
 const BEND: f64 = 10.0;
-/// A step of the force scale by more than this share of itself is no step around it.
-const MOST_OF_SCALE: f64 = 0.75;
 
 /// Fits `hypothesis` to the segments of `role` of all tracks.
 pub(crate) fn fit(
@@ -231,15 +229,6 @@ fn is_straight(hypothesis: &Hypothesis, unknown: Unknown) -> bool {
     }
 }
 
-/// What makes forces of the commands, beside their scale.
-fn is_multiplied_by_force_scale(hypothesis: &Hypothesis, unknown: Unknown) -> bool {
-    match unknown {
-        Unknown::ControlLatency => true,
-        Unknown::Effect(i, _) => hypothesis.members[i].id.description().stage == Stage::Actuation,
-        Unknown::AngularGain | Unknown::Damping | Unknown::ForceScale => false,
-    }
-}
-
 /// The least-squares problem around one hypothesis.
 pub(super) struct Linearised {
     hypothesis: Hypothesis,
@@ -292,23 +281,14 @@ impl Linearised {
         (self.counted[0] + self.counted[1]) as f64
     }
 
-    /// What a step δv of a factor v beside the force scale s is taken times: the data tell s·v far better than either, so that the
-    /// step is taken in the product, δv s/(s + δs), and the residuals do not bend along it.
-    fn factors_step(&self, unknowns: &[Unknown], step: &DVector<f64>) -> f64 {
-        let s = self.hypothesis.force_scale;
-        let by = unknowns.iter().position(|u| *u == Unknown::ForceScale).map_or(0.0, |i| step[i]);
-        if by.abs() < MOST_OF_SCALE * s.abs() { s / (s + by) } else { 1.0 }
-    }
-
     /// Moves `result` from here by `step`, biases and all.
     fn apply(&self, step: &DVector<f64>, result: &mut Fit) {
         (result.chi2, result.prior_chi2) = (self.chi2, self.prior_chi2);
         (result.counted, result.set_aside) = (self.counted, self.set_aside.clone());
         result.step_gain = self.right.dot(step);
-        let shortened = self.factors_step(&result.unknowns, step);
         for (i, u) in result.unknowns.iter().enumerate() {
-            let by = if is_multiplied_by_force_scale(&self.hypothesis, *u) { shortened * step[i] } else { step[i] };
-            result.hypothesis.set(*u, self.hypothesis.get(*u) + by);
+            let value = self.hypothesis.get(*u) + step[i];
+            result.hypothesis.set(*u, value);
         }
         for ((sums, from), to) in self.sums.iter().zip(&self.starts).zip(&mut result.starts) {
             for ((s, from), to) in sums.iter().zip(from).zip(to) {
