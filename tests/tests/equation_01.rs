@@ -117,7 +117,12 @@ fn snapshot_of_the_angle_over_the_input_rotation() {
         let input = f64::from(input_deg).to_radians();
         let there = pattern_angle(0.78, input, 5_f64.to_radians()).to_degrees();
         let back = pattern_angle(0.78, -input, 5_f64.to_radians()).to_degrees();
-        table += &format!("{input_deg:9}{there:11.3}{back:23.3}\n");
+        // summed over a thousand steps of the table, in degrees
+        let step = -0.78 * f64::from(input_deg) / 1000.0;
+        let [forth, reverse] = [step, -step].map(|step| (0..1000).fold(5.0, |theta, _| theta + step));
+        approx::assert_abs_diff_eq!(there, forth, epsilon = 1e-9);
+        approx::assert_abs_diff_eq!(back, reverse, epsilon = 1e-9);
+        table += &format!("{input_deg:9}{forth:11.3}{reverse:23.3}\n");
     }
     insta::assert_snapshot!(table);
 }
