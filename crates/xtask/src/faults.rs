@@ -6,12 +6,13 @@
 
 mod calibrator;
 mod controller;
+mod demodulation;
 mod edges;
 mod estimator;
 mod instrument;
 mod model;
+mod regression;
 mod single;
-mod slips;
 mod unseen;
 
 use std::collections::BTreeSet;
@@ -51,14 +52,15 @@ const fn fault(
 fn library() -> Vec<Fault> {
     [
         model::FAULTS,
+        demodulation::FAULTS,
         estimator::FAULTS,
         controller::FAULTS,
         calibrator::FAULTS,
+        regression::FAULTS,
         instrument::FAULTS,
         edges::FAULTS,
         unseen::FAULTS,
         single::FAULTS,
-        slips::FAULTS,
     ]
     .concat()
 }

@@ -3,20 +3,20 @@
 
 use super::{Fault, fault};
 
-const DIRECTION: (&str, &str) = ("cvg-estimator", "direction");
-const PRECESSION: (&str, &str) = ("cvg-estimator", "precession");
-const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
 const BEAT: (&str, &str) = ("cvg-estimator", "beat");
 const NCO: (&str, &str) = ("cvg-estimator", "nco");
+const PRECESSION: (&str, &str) = ("cvg-estimator", "precession");
+const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
 const PI: (&str, &str) = ("cvg-controller", "pi");
 const FORCES: (&str, &str) = ("cvg-controller", "forces");
 const SUPERVISOR: (&str, &str) = ("cvg-controller", "supervisor");
-const INSTRUMENT: (&str, &str) = ("cvg-instrument", "--lib");
 const JOINED: (&str, &str) = ("cvg-instrument", "composition");
-const CALIBRATOR: (&str, &str) = ("cvg-calibrator", "--lib");
 const MODEL: (&str, &str) = ("cvg-model", "pendulum");
-const SCALAR: (&str, &str) = ("cvg-model", "scalar");
 const C: (&str, &str) = ("cvg-capi", "same_as_rust");
+const DIRECTION: (&str, &str) = ("cvg-estimator", "direction");
+const INSTRUMENT: (&str, &str) = ("cvg-instrument", "--lib");
+const CALIBRATOR: (&str, &str) = ("cvg-calibrator", "--lib");
+const SCALAR: (&str, &str) = ("cvg-model", "scalar");
 const LEARNING: (&str, &str) = ("cvg-capi", "calibrator_same_as_rust");
 
 const STEP: &str = "controller/src/supervisor/step.rs";
@@ -296,5 +296,34 @@ pub(super) const FAULTS: &[Fault] = &[
         "Added { v_qs: f.precession_v, v_qc: f.quadrature_v,",
         "Added { v_qs: f.quadrature_v, v_qc: f.precession_v,",
         LEARNING,
+    ),
+    fault(
+        "the delays of readout and drive are exchanged in C",
+        "capi/src/lib.rs",
+        "readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
+        "readout_delay_s: s.drive_delay_s,\n        drive_delay_s: s.readout_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
+        C,
+    ),
+    fault(
+        "an angle in C is in single precision",
+        "capi/src/lib.rs",
+        "map_or(0.0, SingleState::angle_deg)",
+        "map_or(0.0, |s| f64::from(s.angle_deg() as f32))",
+        C,
+    ),
+    fault(
+        "the sample's channels are exchanged in C",
+        "capi/src/lib.rs",
+        "instrument.step(state, adc_x, adc_y)",
+        "instrument.step(state, adc_y, adc_x)",
+        C,
+    ),
+    fault("the quadrature in C is that of R", "capi/src/lib.rs", "quadrature: p.q,", "quadrature: p.r,", C),
+    fault(
+        "no state is an angle of no number in C",
+        "capi/src/lib.rs",
+        "map_or(0.0, SingleState::angle_deg)",
+        "map_or(f64::NAN, SingleState::angle_deg)",
+        C,
     ),
 ];

@@ -6,6 +6,8 @@ const EQ: (&str, &str) = ("cvg-model", "equations");
 const SCALAR: (&str, &str) = ("cvg-model", "scalar");
 const EFFECTS: (&str, &str) = ("cvg-model", "effects");
 const SINGLE: (&str, &str) = ("cvg-model", "effects_in_single_precision");
+const RESONATOR: (&str, &str) = ("cvg-model", "resonator");
+const MODEL: (&str, &str) = ("cvg-model", "pendulum");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
@@ -252,5 +254,96 @@ pub(super) const FAULTS: &[Fault] = &[
         "rate_rad_s * (T::one() + drift * at.t_s)",
         "rate_rad_s + drift * at.t_s",
         EFFECTS,
+    ),
+    fault(
+        "X's quadrature feed-through goes to Y",
+        "model/src/effects/drive_feedthrough.rs",
+        "y_in * f.y_c + y_quad * f.y_s,",
+        "y_in * f.y_c + x_quad * f.y_s,",
+        EFFECTS,
+    ),
+    fault(
+        "a spring precesses with the other phase",
+        "model/src/effects/spring_cubic.rs",
+        "sin * (r2 - s2)) / size",
+        "sin * (s2 - r2)) / size",
+        EFFECTS,
+    ),
+    fault(
+        "a table's ripple has the opposite phase",
+        "model/src/effects/table_harmonic.rs",
+        "cos * cos_na - sin * sin_na",
+        "cos * cos_na + sin * sin_na",
+        EFFECTS,
+    ),
+    fault(
+        "a clipped carrier's slope is that of its gain",
+        "model/src/effects/detection_saturation.rs",
+        "(r.atan2(rest) - r * rest);",
+        "(r.atan2(rest) + r * rest);",
+        EFFECTS,
+    ),
+    fault(
+        "a quintic goes as the square",
+        "model/src/effects/detection_quintic.rs",
+        "T::one() + T::ratio(5, 8) * kappa * square * square",
+        "T::one() + T::ratio(5, 8) * kappa * square",
+        EFFECTS,
+    ),
+    fault(
+        "a phase lag is put on one channel",
+        "model/src/effects/detection_phase.rs",
+        "        e.y_s * cos + e.y_c * sin,",
+        "        e.y_s * cos - e.y_c * sin,",
+        EFFECTS,
+    ),
+    fault(
+        "a periodic disturbance is told in radians a second",
+        "model/src/effects/time_periodic.rs",
+        "(T::two() * pi * frequency * at.t_s)",
+        "(frequency * at.t_s)",
+        EFFECTS,
+    ),
+    fault(
+        "a harmonic's inverse has a slope of the wrong sign",
+        "model/src/effects/harmonic_n.rs",
+        "T::one() - n * size *",
+        "T::one() + n * size *",
+        EFFECTS,
+    ),
+    fault(
+        "a rate of L has a term of Y with the wrong sign",
+        "model/src/pendulum.rs",
+        "two * (d.x_c * z.x_s + z.x_c * d.x_s + d.y_c * z.y_s + z.y_c * d.y_s)",
+        "two * (d.x_c * z.x_s + z.x_c * d.x_s + d.y_c * z.y_s - z.y_c * d.y_s)",
+        EQ,
+    ),
+    fault(
+        "an orbit that turns back keeps its phase",
+        "model/src/pendulum.rs",
+        "if turn_back { (-along.x_c, -along.x_s) }",
+        "if turn_back { (-along.x_c, along.x_s) }",
+        MODEL,
+    ),
+    fault(
+        "a ratio of detection gains is the inverse",
+        "model/src/detection.rs",
+        "self.y / self.x\n",
+        "self.x / self.y\n",
+        EQ,
+    ),
+    fault(
+        "the centrifugal force stiffens",
+        "model/src/resonator/carrier.rs",
+        "self.omega_rad_s * self.omega_rad_s - self.centrifugal_gain",
+        "self.omega_rad_s * self.omega_rad_s + self.centrifugal_gain",
+        RESONATOR,
+    ),
+    fault(
+        "the Euler force is in Y alone",
+        "model/src/resonator/carrier.rs",
+        "                - euler * m.x\n",
+        "                + euler * m.x\n",
+        RESONATOR,
     ),
 ];
