@@ -7,7 +7,9 @@ use super::model::Term;
 use super::report::{Finding, estimate, shown, whole, whole_raw};
 use super::runs::DecayRun;
 use super::selection::{Added, BELIEVED, is_declared};
+use crate::data::track::wrapped;
 use crate::model::hypothesis::Origin;
+use crate::report::polar::polar;
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport, Rival};
 
 /// An isotropic nonlinear spring: θ̇ += c·Q, and a frequency that goes with E.
@@ -83,20 +85,13 @@ fn anisotropy(fit: &Fit, id: EffectId, [along, across]: [Term; 2]) -> EffectRepo
         (Some(i), Some(j)) => (fit.covariance[(i, i)], fit.covariance[(j, j)], fit.covariance[(i, j)]),
         _ => (0.0, 0.0, 0.0),
     };
-    let size = a.hypot(b).max(f64::MIN_POSITIVE);
-    let deviation = (a * a * va + b * b * vb + 2.0 * a * b * vab).max(0.0).sqrt() / size;
-    let turn = (b * b * va + a * a * vb - 2.0 * a * b * vab).max(0.0).sqrt() / (size * size);
     let (magnitude, unit, angle, division) = shown(id).unwrap_or(("magnitude", "1/s", "axis", 2.0));
-    let axis = b.atan2(a) / division + fit.model.axis_rad;
-    let quarter = std::f64::consts::PI / division;
-    let axis = crate::data::track::wrapped(axis, 2.0 * quarter);
+    let (size, axis) = polar([a, b], (va, vb, vab), division);
+    let turned = wrapped(axis.value + fit.model.axis_rad.to_degrees(), 360.0 / division) - axis.value;
     EffectReport {
         id: id.description().id.into(),
         origin: Origin::Declared,
-        parameters: vec![
-            entry(magnitude, unit, Estimate::new(size, deviation)),
-            entry(angle, "deg", Estimate::new(axis.to_degrees(), (turn / division).to_degrees())),
-        ],
+        parameters: vec![entry(magnitude, unit, size), entry(angle, "deg", axis.turned(turned))],
         heldout_rms_deg: None,
         evidence: "declared; from the equation of motion, fitted to E, Q and θ of all decays at once".into(),
         confounded_with: Vec::new(),

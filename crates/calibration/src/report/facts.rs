@@ -79,6 +79,12 @@ impl Estimate {
         Self { ci95: [self.ci95[0] - by, self.ci95[1] + by], ..self }
     }
 
+    /// The same, counted from elsewhere.
+    #[must_use]
+    pub(crate) fn turned(self, by: f64) -> Self {
+        Self { value: self.value + by, ci95: self.ci95.map(|end| end + by) }
+    }
+
     /// Of what is not told: no number.
     pub fn unknown() -> Self {
         Self { value: f64::NAN, ci95: [f64::NAN; 2] }

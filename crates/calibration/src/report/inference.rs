@@ -1,8 +1,6 @@
 //! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
 //! the campaign tells it.
 
-use std::f64::consts::PI;
-
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
@@ -13,6 +11,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
+use crate::report::polar::polar;
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport};
 use crate::selection::step::Step;
 
@@ -291,26 +290,6 @@ impl Inference<'_> {
     }
 }
 
-/// Magnitude √(c² + s²) and angle atan2(s, c)/`division`, degrees, of two parameters with their variances and covariance: by
-/// propagation, and the angle at least as far as the directions φ that data may have in which c sin φ = s cos φ, Fieller's
-/// interval. Where the magnitude may be nothing along the pattern it goes to both sides, or all around.
-fn polar([c, s]: [f64; 2], (vc, vs, vcs): (f64, f64, f64), division: f64) -> (Estimate, Estimate) {
-    let size = c.hypot(s).max(f64::MIN_POSITIVE);
-    let (cos, sin) = (c / size, s / size);
-    let along = (cos * cos * vc + sin * sin * vs + 2.0 * cos * sin * vcs).max(0.0);
-    let across = (sin * sin * vc + cos * cos * vs - 2.0 * cos * sin * vcs).max(0.0);
-    let between = cos * sin * (vs - vc) + (cos * cos - sin * sin) * vcs;
-    let turn = across.sqrt() / size;
-    // (size tan δ)² ≤ 1.96² (along tan² δ − 2 between tan δ + across) at δ from the angle
-    let z2 = 1.96 * 1.96;
-    let (bend, slant) = (size * size - z2 * along, (z2 * between).abs());
-    let square = slant * slant + bend * z2 * across;
-    let farthest = if square >= 0.0 { (slant + square.sqrt()).atan2(bend) } else { PI };
-    let by_propagation = Estimate::new((s.atan2(c) / division).to_degrees(), (turn / division).to_degrees());
-    let beyond = (farthest - 1.96 * turn).max(0.0);
-    (Estimate::new(c.hypot(s), along.sqrt()), by_propagation.widened((beyond / division).to_degrees()))
-}
-
 /// One sentence on why an effect is believed.
 fn evidence(member: &Member, step: Option<&Step>) -> String {
     let d = member.id.description();
@@ -337,36 +316,6 @@ fn evidence(member: &Member, step: Option<&Step>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_angle_of_a_magnitude_that_may_be_nothing_is_within_its_interval() {
-        // pairs of standard normal numbers, each as likely as the next
-        let share = |i: i32| (f64::from(i) + 0.5) / 60.0;
-        let pair = |i: i32, j: i32| {
-            let ((sin, cos), r) = ((2.0 * PI * share(j)).sin_cos(), (-2.0 * share(i).ln()).sqrt());
-            [r * cos, r * sin]
-        };
-        // known well across one direction and poorly along it, as anisodamping beside a gain ratio at one rate
-        let (poor, well, turned) = (3e-4, 1e-5, 0.4f64);
-        let (sin, cos) = turned.sin_cos();
-        let [vc, vs, vcs] = [
-            (poor * cos).powi(2) + (well * sin).powi(2),
-            (poor * sin).powi(2) + (well * cos).powi(2),
-            (poor * poor - well * well) * sin * cos,
-        ];
-        for (size, bearing) in [(1e-4, 0.4), (1e-4, 1.2), (1e-4, -2.0), (3e-5, 0.9), (1e-3, 0.4), (5e-3, 2.5)] {
-            let planted = [size * f64::cos(bearing), size * f64::sin(bearing)];
-            let mut held = 0_u32;
-            for [a, b] in (0..60).flat_map(|i| (0..60).map(move |j| (i, j))).map(|(i, j)| pair(i, j)) {
-                let own = [planted[0] + poor * a * cos - well * b * sin, planted[1] + poor * a * sin + well * b * cos];
-                let (_, angle) = polar(own, (vc, vs, vcs), 2.0);
-                let off = (0.5 * bearing.to_degrees() - angle.value + 90.0).rem_euclid(180.0) - 90.0;
-                held += u32::from((angle.ci95[0]..=angle.ci95[1]).contains(&(angle.value + off)));
-            }
-            let share = f64::from(held) / 3600.0;
-            assert!(share >= 0.94, "{size} at {bearing}: {share}");
-        }
-    }
 
     #[test]
     fn an_interval_covers_the_runs_that_contradict_it_and_no_others() {

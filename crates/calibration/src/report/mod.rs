@@ -7,6 +7,7 @@ mod facts;
 pub(crate) mod gate;
 pub(crate) mod inference;
 pub(crate) mod laws;
+pub(crate) mod polar;
 pub(crate) mod proposals;
 pub(crate) mod provenance;
 pub mod refused;

@@ -1,0 +1,64 @@
+//! Two parameters (c, s) of an effect as people read them: a magnitude and an angle, each with its interval.
+
+use std::f64::consts::PI;
+
+use crate::report::Estimate;
+
+/// The 97.5 % point of the normal distribution.
+const NORMAL: f64 = 1.96;
+
+/// Magnitude √(c² + s²), and angle atan2(s, c)/`division` in degrees, of parameters with variances and covariance
+/// (c, s, both).
+///
+/// Intervals are by propagation, and that of the angle reaches at least as far as Fieller's (1954), which has all directions along
+/// which the data may lie: where the magnitude may be nothing it goes all around.
+pub(crate) fn polar([c, s]: [f64; 2], (vc, vs, vcs): (f64, f64, f64), division: f64) -> (Estimate, Estimate) {
+    let size = c.hypot(s).max(f64::MIN_POSITIVE);
+    let (cos, sin) = (c / size, s / size);
+    let along = (cos * cos * vc + sin * sin * vs + 2.0 * cos * sin * vcs).max(0.0);
+    let across = (sin * sin * vc + cos * cos * vs - 2.0 * cos * sin * vcs).max(0.0);
+    let between = cos * sin * (vs - vc) + (cos * cos - sin * sin) * vcs;
+    let turn = across.sqrt() / size;
+    // (size tan δ)² ≤ 1.96² (along tan² δ − 2 between tan δ + across) at δ from the angle
+    let (bend, slant) = (size * size - NORMAL * NORMAL * along, (NORMAL * NORMAL * between).abs());
+    let square = slant * slant + bend * NORMAL * NORMAL * across;
+    let farthest = if square >= 0.0 { (slant + square.sqrt()).atan2(bend) } else { PI };
+    let by_propagation = Estimate::new((s.atan2(c) / division).to_degrees(), (turn / division).to_degrees());
+    let beyond = (farthest - NORMAL * turn).max(0.0);
+    (Estimate::new(c.hypot(s), along.sqrt()), by_propagation.widened((beyond / division).to_degrees()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_angle_of_a_magnitude_that_may_be_nothing_is_within_its_interval() {
+        // pairs of standard normal numbers, each as likely as the next
+        let share = |i: i32| (f64::from(i) + 0.5) / 60.0;
+        let pair = |i: i32, j: i32| {
+            let ((sin, cos), r) = ((2.0 * PI * share(j)).sin_cos(), (-2.0 * share(i).ln()).sqrt());
+            [r * cos, r * sin]
+        };
+        // known well across one direction and poorly along it, as anisodamping beside a gain ratio at one rate
+        let (poor, well, turned) = (3e-4, 1e-5, 0.4f64);
+        let (sin, cos) = turned.sin_cos();
+        let [vc, vs, vcs] = [
+            (poor * cos).powi(2) + (well * sin).powi(2),
+            (poor * sin).powi(2) + (well * cos).powi(2),
+            (poor * poor - well * well) * sin * cos,
+        ];
+        for (size, bearing) in [(1e-4, 0.4), (1e-4, 1.2), (1e-4, -2.0), (3e-5, 0.9), (1e-3, 0.4), (5e-3, 2.5)] {
+            let planted = [size * f64::cos(bearing), size * f64::sin(bearing)];
+            let mut held = 0_u32;
+            for [a, b] in (0..60).flat_map(|i| (0..60).map(move |j| (i, j))).map(|(i, j)| pair(i, j)) {
+                let own = [planted[0] + poor * a * cos - well * b * sin, planted[1] + poor * a * sin + well * b * cos];
+                let (_, angle) = polar(own, (vc, vs, vcs), 2.0);
+                let off = (0.5 * bearing.to_degrees() - angle.value + 90.0).rem_euclid(180.0) - 90.0;
+                held += u32::from((angle.ci95[0]..=angle.ci95[1]).contains(&(angle.value + off)));
+            }
+            let share = f64::from(held) / 3600.0;
+            assert!(share >= 0.94, "{size} at {bearing}: {share}");
+        }
+    }
+}
