@@ -31,15 +31,14 @@ impl Conversion {
 const ICE_K: f64 = 273.15;
 const RADIAN_DEG: f64 = 180.0 / std::f64::consts::PI;
 
-/// Seconds since 1970 are fewer until the year 5138, and milliseconds are more since March 1973.
-const FEWER_SECONDS: f64 = 1e11;
+/// Parts of a second, and from how many of them on a time is counted in them since 1970: milliseconds are as many since March
+/// 1973, seconds in the year 5138.
+const SINCE_1970: [(&str, f64, f64); 3] = [("ns", 1e-9, 1e17), ("us", 1e-6, 1e14), ("ms", 1e-3, 1e11)];
 
-/// The unit of a time without one that is counted since 1970 in parts of a second, by how many they are.
+/// The unit of a time that states none and is too large for seconds.
 pub(crate) fn since_1970(time: f64) -> Option<(&'static str, Conversion)> {
-    [("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3)]
-        .into_iter()
-        .find(|(_, factor)| time >= 1e-3 * FEWER_SECONDS / factor)
-        .map(|(unit, factor)| (unit, Conversion::by(factor)))
+    let (unit, factor, _) = SINCE_1970.into_iter().find(|(_, _, least)| time >= *least)?;
+    Some((unit, Conversion::by(factor)))
 }
 
 /// The conversion of a unit to a channel's; `None` where it is not known to be one of this kind.

@@ -210,6 +210,9 @@ fn times_of_an_hdf5_file_may_be_dates() {
     let recording = Recording::read_from(bytes.as_slice(), &names, Path::new("a.h5")).unwrap();
     assert_eq!(recording.t_s, [0.0, 0.1, 0.2]);
     assert!(recording.warnings.iter().any(|w| w.contains("times are written as dates")), "{:?}", recording.warnings);
+    let with_a_factor = naming(&["t_s=when/1000", "theta_deg=theta"]);
+    let said = Recording::read_from(bytes.as_slice(), &with_a_factor, Path::new("a.h5")).unwrap_err().to_string();
+    assert!(said.contains("`when` is of dates") && said.contains("factor"), "{said}");
     // what could be the time is named where none is mapped
     let said = Recording::read_from(bytes.as_slice(), Naming::NONE, Path::new("a.h5")).unwrap_err().to_string();
     assert!(said.contains("`when`"), "{said}");

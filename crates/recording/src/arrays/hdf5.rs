@@ -70,6 +70,10 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>,
             values = dates(&dataset);
             is_dated |= values.is_some() && naming.channel(name) == Some(Channel::Time);
         }
+        if is_dated && naming.factor(Channel::Time).is_some_and(|factor| factor != 1.0) {
+            let what = format!("`{name}` is of dates, and the mapping of `t_s` has a factor; wanted none");
+            return Err(refuse(source, KIND, what));
+        }
         let size: Vec<usize> = array.size.iter().map(|&n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
         push(&mut arrays, name, &size, values, false);
     }
