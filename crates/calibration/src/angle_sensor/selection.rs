@@ -263,8 +263,8 @@ impl<'a> Selection<'a> {
             .collect();
         with.sort_by(|a, b| a.losses.rms().total_cmp(&b.losses.rms()));
         let (best, aliases) = with.split_first()?;
-        let told = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
-        (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(told)).then(|| best.clone())
+        let distinct = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
+        (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
     }
 }
 

@@ -31,7 +31,7 @@ impl Jet {
         jet
     }
 
-    // Lanes are written out: an iterator over them is not always inlined, and then takes twice the time of all the rest.
+    // Lanes are written out: an iterator over them is not always inlined.
 
     /// f(self) given f and f′ at the value.
     #[inline]
