@@ -82,6 +82,21 @@ table! {
     /// Cubic readout undone
     CUBIC_INVERSE: "unread ∘ read, cubic readout", 2e-15, 1e-6,
         "of a: Newton's iteration ends at the rounding of two cubics and two products";
+    /// the oscillator's phasor one sample later
+    NEXT_PHASOR: "the phasor of the next sample", 2.4e-16, 1.29e-7,
+        "of a phasor and a step of length 1: two products and their sum, each rounded once: ε, and the room of a box";
+    /// the oscillator's phasor at the beginning of a window
+    TUNED_PHASOR: "a tuned phasor", 4.2e-16, 2.1e-7,
+        "of length 1: its squared length, the scale and the product: below 2 ε";
+    /// the oscillator's step at the beginning of a window
+    TUNED_STEP: "a tuned step", 4.2e-16, 2.1e-7,
+        "of length 1: the rounded nominal step turned by two series: below 2 ε";
+    /// a window's sums after one sample more
+    SAMPLE_SUM: "a window's sums after one sample more", 2.5e-16, 1.34e-7,
+        "of half the sum before and the sample: ε of each, and the room of a box";
+    /// the envelope that a window is fitted by
+    WINDOW_FIT: "the fit of a window", 2.220446049250313e-16, 1.1920928955078125e-7,
+        "of the largest sample: ε times five a sample and 240 for the normal equations, after what the window's phasors and sums are off by";
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! positive it is a bound between the numbers themselves.
 
 use cvg_estimator::precession::{half_the_angle, twice_the_angle};
-use cvg_model::{Envelope, Orbit, Pendulum, Real};
+use cvg_model::{Envelope, Float, Orbit, Pendulum, Real};
 use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
 use cvg_tests::domain::{any_vector, octave, unit};
 use cvg_tests::for_each_precision;
@@ -219,7 +219,7 @@ fn directions_ahead() -> Vec<Inputs> {
 struct AngleAhead;
 
 impl Formula for AngleAhead {
-    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+    fn outputs<T: Float>(&self, x: &[T]) -> Vec<T> {
         AngleOf.outputs(x)
     }
 }

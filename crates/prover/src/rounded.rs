@@ -90,6 +90,11 @@ impl<F: Format> Rounded<F> {
         Self::made(real, 0.0)
     }
 
+    /// An input of which the machine holds a number that is off by up to `error`, from what came before.
+    pub fn input_within(real: Interval, error: f64) -> Self {
+        Self::made(real, error)
+    }
+
     fn made(real: Interval, error: f64) -> Self {
         let size = sum(real.magnitude(), error);
         // an overflow, or a NaN of infinities: nothing is known
@@ -322,6 +327,50 @@ impl<F: Format> Real for Rounded<F> {
         let near = x.real.lo <= x.error && y.real.lo <= y.error && y.real.hi >= -y.error && y.inexact();
         let turns = if cut || near { 1.0 } else { 0.0 };
         Self::by_library(real, carried, F::ATAN2_ULPS).turned(turns)
+    }
+}
+
+/// What running code asks of its numbers beyond the equations. Whole parts and conversions back are refused: the machine's and
+/// the real ones may lie far apart.
+impl<F: Format> Float for Rounded<F> {
+    const PI: Self = Self {
+        real: Interval { lo: std::f64::consts::PI, hi: std::f64::consts::PI.next_up() },
+        error: 4.0 * F::UNIT,
+        turns: 0.0,
+        format: PhantomData,
+    };
+
+    /// A constant of the configuration: a whole number is meant as it stands, any other is what f64 rounded it to.
+    fn from_f64(value: f64) -> Self {
+        assert!(value.is_finite(), "refused: {value} is not a real number");
+        let machine = F::from_f64(value).to_f64();
+        if value.fract() == 0.0 && machine == value {
+            return Self::input(Interval::point(value));
+        }
+        let real = Interval::new(value.next_down(), value.next_up());
+        Self::made(real, (machine - real.lo).max(real.hi - machine).next_up())
+    }
+
+    fn to_f64(self) -> f64 {
+        let Some(value) = self.exact() else { panic!("refused: {self:?} has no one value") };
+        value
+    }
+
+    /// Where nothing is known of the machine's value, the two may differ in the answer.
+    fn is_finite(self) -> bool {
+        let known = self.settled().error.is_finite() && self.real.magnitude().is_finite();
+        PATH.with(|path| path.borrow_mut().undecided |= !known);
+        true
+    }
+
+    fn floor(self) -> Self {
+        panic!("refused: the whole part of {self:?}")
+    }
+
+    /// |self|, which is no further from the real one than self is.
+    fn magnitude(self) -> Self {
+        let v = self.settled();
+        Self::made(Interval::new(v.real.mignitude(), v.real.magnitude()), v.error)
     }
 }
 

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use cvg_model::Real;
+use cvg_model::Float;
 
 use crate::rounded::{Follows, on_every_path};
 use crate::{Format, Interval, Rounded};
@@ -14,10 +14,16 @@ use crate::{Format, Interval, Rounded};
 /// A formula whose rounding is to be bounded: the shipping function, as generic as that is.
 pub trait Formula {
     /// What is computed from the inputs.
-    fn outputs<T: Real>(&self, inputs: &[T]) -> Vec<T>;
+    fn outputs<T: Float>(&self, inputs: &[T]) -> Vec<T>;
+
+    /// How far the machine's inputs may be from the real ones, by what came before; one for each, or none where it holds
+    /// them exactly.
+    fn input_errors(&self) -> &[f64] {
+        &[]
+    }
 
     /// What the tolerance is relative to; 1 where it is absolute.
-    fn scale<T: Real>(&self, inputs: &[T]) -> T {
+    fn scale<T: Float>(&self, inputs: &[T]) -> T {
         let _ = inputs;
         T::one()
     }
@@ -112,9 +118,17 @@ pub fn bound_rounding<F: Format>(
     if bounded.points == 0 { Err(Failure::Nothing { at: Vec::new() }) } else { Ok(bounded) }
 }
 
+/// The inputs of a box, and how far the machine's may be from them.
+fn enclosed<F: Format>(formula: &impl Formula, at: &[Interval]) -> Vec<Rounded<F>> {
+    let errors = formula.input_errors();
+    assert!(errors.is_empty() || errors.len() == at.len(), "one error for each input, or none");
+    let error = |k: usize| errors.get(k).copied().unwrap_or(0.0);
+    at.iter().enumerate().map(|(k, side)| Rounded::input_within(*side, error(k))).collect()
+}
+
 /// The error bound on a box as a share of what is allowed there.
 fn share<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, factor: f64) -> Option<f64> {
-    let inputs: Vec<_> = at.iter().map(|i| Rounded::<F>::input(*i)).collect();
+    let inputs = enclosed::<F>(formula, at);
     let period = formula.period_turns();
     let shares = on_every_path(Follows::Both, || {
         let allowed = (tolerance * formula.scale(&inputs).real.lo).next_down();
@@ -134,16 +148,17 @@ fn share<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, fac
     shares.into_iter().reduce(f64::max)
 }
 
-/// Runs the machine in the middle of a box: what it gives has to lie in what the engine encloses, and is refuted where it
-/// is too far from the real value, whichever way each of the two branches.
+/// Runs the machine in the middle of a box, with its inputs off by as much as they may be: what it gives has to lie in what
+/// the engine encloses, and is refuted where it is too far from the real value, whichever way each of the two branches.
 fn check_point<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f64, factor: f64) -> Result<(), Failure> {
     let inputs: Vec<F> = at.iter().map(|i| F::from_f64(i.middle())).collect();
     let middle: Vec<f64> = inputs.iter().map(|v| v.to_f64()).collect();
     if at.iter().zip(&middle).any(|(side, value)| !side.contains(*value)) {
         return Ok(());
     }
-    let exact: Vec<_> = middle.iter().map(|v| Rounded::<F>::input(Interval::point(*v))).collect();
-    let machine = formula.outputs(&inputs);
+    let points: Vec<_> = middle.iter().map(|v| Interval::point(*v)).collect();
+    let exact = enclosed::<F>(formula, &points);
+    let machine = formula.outputs(&moved::<F>(formula, &middle));
     if machine.is_empty() {
         return Err(Failure::Nothing { at: at.to_vec() });
     }
@@ -167,6 +182,17 @@ fn check_point<F: Format>(formula: &impl Formula, at: &[Interval], tolerance: f6
         }
     }
     Ok(())
+}
+
+/// What the machine holds where it is off by as much as it may be, on either side by turns.
+fn moved<F: Format>(formula: &impl Formula, at: &[f64]) -> Vec<F> {
+    let errors = formula.input_errors();
+    let one = |(k, value): (usize, &f64)| {
+        let error = errors.get(k).copied().unwrap_or(0.0);
+        let moved = F::from_f64(if k % 2 == 0 { value + error } else { value - error });
+        if (moved.to_f64() - value).abs() <= error { moved } else { F::from_f64(*value) }
+    };
+    at.iter().enumerate().map(one).collect()
 }
 
 /// How far `value` is from `real` at least, up to `turns` forward or back; infinitely far where it is no number.

@@ -182,3 +182,79 @@ fn no_number_is_not_within_a_tolerance() {
     assert!(bound(RootOfNothing, 0.0, &positive(), 1.0).is_err());
     assert!(<f32 as Float>::is_finite(RootOfNothing.of(0.5, 0.5)[0]));
 }
+
+/// x y, the machine's x being off by up to a thousandth.
+struct OffProduct([f64; 2]);
+
+impl Formula for OffProduct {
+    fn outputs<T: Real>(&self, x: &[T]) -> Vec<T> {
+        vec![x[0] * x[1]]
+    }
+
+    fn input_errors(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+#[test]
+fn what_an_input_is_off_by_is_in_the_bound_and_refutes_a_tighter_one() {
+    let bound = |errors, tolerance| bound_rounding::<f32>(&OffProduct(errors), &positive(), tolerance, 1.0);
+    bound([1e-3, 0.0], 1.001e-3).expect("of a factor of up to 1");
+    bound([0.0; 2], 1e-7).expect("its own rounding");
+    for tighter in [0.9e-3, 1e-4] {
+        // somewhere the other factor is 1, and in the middle of the box three quarters
+        let result = bound([1e-3, 0.0], tighter);
+        assert!(result.is_err(), "{result:?}");
+    }
+    assert!(matches!(bound([1e-3, 0.0], 1e-4), Err(Failure::Refuted { .. })));
+}
+
+#[test]
+fn a_constant_of_the_configuration_is_rounded() {
+    let tenth = <Rounded<f32> as Float>::from_f64(0.1);
+    assert!(tenth.real.contains(0.1) && tenth.real.lo < 0.1 && tenth.real.hi > 0.1, "f64 has rounded it: {tenth:?}");
+    let off = (f64::from(0.1_f32) - 0.1).abs();
+    assert!(tenth.error >= off && tenth.error < 1.1 * off, "{tenth:?}");
+    let whole = <Rounded<f32> as Float>::from_f64(50.0);
+    assert_eq!((whole.real, whole.error), (Interval::point(50.0), 0.0));
+    let beyond = <Rounded<f32> as Float>::from_f64(16_777_217.0);
+    assert!(beyond.error >= 1.0, "f32 has no such number: {beyond:?}");
+}
+
+#[test]
+fn a_magnitude_keeps_the_error_and_settles_turns() {
+    let off = Rounded::<f64>::input_within(Interval::new(-2.0, 1.0), 1e-3);
+    let size = off.magnitude();
+    assert_eq!((size.real, size.error), (Interval::new(0.0, 2.0), 1e-3));
+    let angle = Rounded::<f64>::input(Interval::new(-1e-3, 1e-3)).atan2(Rounded::input(Interval::point(-1.0)));
+    assert!(angle.magnitude().error > TAU, "{:?}", angle.magnitude());
+}
+
+/// A formula that asks whether its result is finite, and whether it is within a limit.
+struct Guarded(f64);
+
+impl Formula for Guarded {
+    fn outputs<T: Float>(&self, x: &[T]) -> Vec<T> {
+        let quotient = x[0] / (x[1] - T::from_f64(self.0));
+        vec![if quotient.is_finite() && quotient.within(T::from_f64(100.0)) { quotient } else { T::zero() }]
+    }
+}
+
+#[test]
+fn where_the_machine_may_have_no_number_it_is_not_taken_for_finite() {
+    bound_rounding::<f32>(&Guarded(0.25), &positive(), 1e-5, 1.0).expect("a divisor far from 0");
+    let result = bound_rounding::<f32>(&Guarded(0.75), &positive(), 1.0, 1.0);
+    assert!(result.is_err(), "{result:?}");
+}
+
+#[test]
+#[should_panic(expected = "refused")]
+fn a_whole_part_is_refused() {
+    let _ = Float::floor(Rounded::<f64>::input(Interval::new(0.5, 1.5)));
+}
+
+#[test]
+#[should_panic(expected = "refused")]
+fn a_number_of_a_box_is_refused() {
+    let _ = Rounded::<f64>::input(Interval::new(0.5, 1.5)).to_f64();
+}

@@ -40,10 +40,11 @@ impl Chain {
         if least > 0.0 { half_step * (2.0 * n / least).sqrt() } else { f64::INFINITY }
     }
 
-    /// What the machine's arithmetic leaves of a window, V: eight roundings a sample, and four of the compensation.
+    /// What the machine's arithmetic leaves of a window, V: ε times 5 a sample and 240 for the fit, which `window_rounding.rs` proves
+    /// of each component, are at most twice that for the length of four; and two of the compensation.
     pub(crate) fn window_rounding_v(&self) -> f64 {
         let most = self.amplitude_v * (self.undone * self.left).max(1.0) + self.offset_v;
-        8.0 * self.epsilon * (f64::from(self.samples) + 0.5) * most
+        2.0 * self.epsilon * (5.0 * f64::from(self.samples) + 241.0) * most
     }
 
     /// By how much an error of the readout is larger behind the compensation, at most.
