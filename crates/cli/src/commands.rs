@@ -25,9 +25,8 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
     output::check_folder(out)?;
     let progress = Progress::begin();
     progress.say("simulating");
-    let simulated = parsed.simulate();
     let set = output::Set::begin(out, &[scenario.to_owned()])?;
-    simulated.write(set.folder()).map_err(Failure::input)?;
+    parsed.write(set.folder()).map_err(Failure::input)?;
     set.commit()?;
     drop(progress);
     output::tell(format_args!("wrote {}", out.join("campaign.toml").display()));

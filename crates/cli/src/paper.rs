@@ -79,6 +79,7 @@ fn scenario() -> Result<Scenario, Failure> {
         profile: Profile::default(),
         reference: Reference::default(),
         start_deg: None,
+        carrier_sample_hz: None,
     });
     Scenario::new(settings).map_err(Failure::input)
 }

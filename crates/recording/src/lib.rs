@@ -38,7 +38,7 @@ pub use error::{Place, ReadError};
 pub use memory::{limit_memory, memory_limit, panic_is_answer};
 pub use naming::Naming;
 #[cfg(feature = "parquet")]
-pub use parquet::{Lake, write_parquet};
+pub use parquet::{Lake, write_parquet, write_parquet_numbers};
 pub use unknown::{Cells, UnknownColumn};
 
 /// One recording: columns of equal length, one value a row.

@@ -1,4 +1,5 @@
-//! Simulated recordings in memory, and the folder they are written to: campaign.toml, one CSV file per run, truth.toml.
+//! Simulated recordings in memory, and the folder they are written to: campaign.toml, one CSV or Parquet file per run,
+//! truth.toml.
 //!
 //! A row is one control sample as the electronics saw it: the readout with its noise and the commands computed from
 //! it, which are applied from that sample on. `rate_dps` is the commanded rate, `table_deg` the table's true angle.
@@ -10,10 +11,15 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use cvg_model::effects::EffectId;
+use cvg_recording::write_parquet_numbers;
 use serde::Serialize;
 
+use crate::carrier::displacement;
 use crate::closed_loop::ClosedLoop;
-use crate::scenario::{EffectSetting, Instrument, Purpose, Reference, Run, Scenario, Settings};
+use crate::scenario::{EffectSetting, Instrument, Profile, Purpose, Reference, Run, Scenario, Settings};
+
+/// What free decays find of an isotropic nonlinear spring goes by this name.
+const SPRING_ISOTROPIC: &str = "spring-isotropic";
 
 /// One column of a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +62,19 @@ impl SimulatedRun {
     /// The values of a column, if the recording has it.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
+    }
+
+    /// Writes the recording into the folder `dir`, as the name of its file says.
+    fn write(&self, dir: &Path) -> Result<(), WriteError> {
+        let path = dir.join(self.run.file());
+        let written =
+            if self.run.file().ends_with(".parquet") { self.parquet(&path) } else { fs::write(&path, self.csv()) };
+        written.map_err(|source| WriteError { path, source })
+    }
+
+    fn parquet(&self, path: &Path) -> io::Result<()> {
+        let columns: Vec<(&str, &[f64])> = self.columns.iter().map(|c| (c.name, c.values.as_slice())).collect();
+        write_parquet_numbers(&columns, io::BufWriter::new(fs::File::create(path)?))
     }
 
     /// The recording as CSV: nine significant digits of the column's largest value.
@@ -111,15 +130,38 @@ impl Scenario {
     pub fn simulate(&self) -> Simulated {
         Simulated::new(self)
     }
+
+    /// Simulates the runs one after the other, each written before the next, as [`Simulated::write`] writes them: displacements
+    /// of a minute are millions.
+    ///
+    /// # Errors
+    /// The first file or folder that cannot be written.
+    pub fn write(&self, dir: impl AsRef<Path>) -> Result<(), WriteError> {
+        let dir = dir.as_ref();
+        create(dir)?;
+        for (index, run) in self.settings().runs.iter().enumerate() {
+            simulated(self, index, run).write(dir)?;
+        }
+        Simulated { settings: self.settings().clone(), runs: Vec::new() }.write_texts(dir)
+    }
+}
+
+fn create(dir: &Path) -> Result<(), WriteError> {
+    fs::create_dir_all(dir).map_err(|source| WriteError { path: dir.to_owned(), source })
+}
+
+fn simulated(scenario: &Scenario, index: usize, run: &Run) -> SimulatedRun {
+    SimulatedRun { run: run.clone(), columns: record(scenario, index, run) }
 }
 
 impl Simulated {
     /// Simulates every run of `scenario`.
     pub fn new(scenario: &Scenario) -> Self {
         let runs = scenario.settings().runs.iter().enumerate();
-        let simulated =
-            runs.map(|(index, run)| SimulatedRun { run: run.clone(), columns: record(scenario, index, run) });
-        Self { runs: simulated.collect(), settings: scenario.settings().clone() }
+        Self {
+            runs: runs.map(|(index, run)| simulated(scenario, index, run)).collect(),
+            settings: scenario.settings().clone(),
+        }
     }
 
     /// Writes campaign.toml, the recordings and truth.toml into the folder `dir`, which is created if need be.
@@ -128,16 +170,17 @@ impl Simulated {
     /// The first file or folder that cannot be written.
     pub fn write(&self, dir: impl AsRef<Path>) -> Result<(), WriteError> {
         let dir = dir.as_ref();
-        fs::create_dir_all(dir).map_err(|source| WriteError { path: dir.to_owned(), source })?;
-        let write = |name: &str, text: &str| {
+        create(dir)?;
+        self.runs.iter().try_for_each(|run| run.write(dir))?;
+        self.write_texts(dir)
+    }
+
+    fn write_texts(&self, dir: &Path) -> Result<(), WriteError> {
+        for (name, text) in [("campaign.toml", self.campaign_toml()), ("truth.toml", self.truth_toml())] {
             let path = dir.join(name);
-            fs::write(&path, text).map_err(|source| WriteError { path, source })
-        };
-        for run in &self.runs {
-            write(run.run.file(), &run.csv())?;
+            fs::write(&path, text).map_err(|source| WriteError { path, source })?;
         }
-        write("campaign.toml", &self.campaign_toml())?;
-        write("truth.toml", &self.truth_toml())
+        Ok(())
     }
 
     /// The campaign's description.
@@ -178,9 +221,17 @@ impl Simulated {
             truth.insert("tau_s".to_owned(), s.tau_s.into());
         }
         let undeclared = s.effects.iter().filter(|e| !e.id.description().declared);
-        let ids: Vec<toml::Value> = undeclared.map(|e| e.id.description().id.into()).collect();
+        let mut ids: Vec<toml::Value> = undeclared.map(|e| e.id.description().id.into()).collect();
+        let mut effects: Vec<toml::Value> = s.effects.iter().map(|e| toml::Table::from(*e).into()).collect();
+        if let Some(spring) = &s.spring_isotropic {
+            ids.push(SPRING_ISOTROPIC.into());
+            let mut table = toml::Table::new();
+            table.insert("id".to_owned(), SPRING_ISOTROPIC.into());
+            table.insert("c".to_owned(), spring.c.into());
+            table.insert("frequency_per_energy".to_owned(), spring.frequency_per_energy().into());
+            effects.push(table.into());
+        }
         truth.insert("undeclared".to_owned(), ids.into());
-        let effects: Vec<toml::Value> = s.effects.iter().map(|e| toml::Table::from(*e).into()).collect();
         truth.insert("effect".to_owned(), effects.into());
         format!("# what the bench was set to\n{}", serialised(&truth))
     }
@@ -224,6 +275,16 @@ enum CampaignRun<'a> {
         #[serde(rename = "use")]
         purpose: Purpose,
         amplitude: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rate_dps: Option<f64>,
+    },
+    Decay {
+        file: &'a str,
+        #[serde(rename = "use")]
+        purpose: Purpose,
+        amplitude: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rate_dps: Option<f64>,
     },
     Ringdown {
         file: &'a str,
@@ -241,9 +302,18 @@ enum CampaignRun<'a> {
 impl<'a> CampaignRun<'a> {
     fn of(run: &'a Run) -> Self {
         match run {
-            Run::Rotation { file, settle_s, purpose, amplitude, .. } => {
-                Self::Rotation { file, settle_s: *settle_s, purpose: *purpose, amplitude: *amplitude }
+            Run::Rotation { file, settle_s, purpose, amplitude, rate_dps, profile, carrier_sample_hz, .. } => {
+                // a column where it changes, and beside envelopes
+                let constant = carrier_sample_hz.is_some() && *profile == Profile::Constant;
+                let rate_dps = constant.then_some(*rate_dps);
+                Self::Rotation { file, settle_s: *settle_s, purpose: *purpose, amplitude: *amplitude, rate_dps }
             }
+            Run::Decay { file, purpose, amplitude, rate_dps, carrier_sample_hz, .. } => Self::Decay {
+                file,
+                purpose: *purpose,
+                amplitude: *amplitude,
+                rate_dps: carrier_sample_hz.map(|_| *rate_dps),
+            },
             Run::Ringdown { file, angle_deg, energy_off_s, .. } => {
                 Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s }
             }
@@ -256,6 +326,9 @@ impl<'a> CampaignRun<'a> {
 
 /// The columns of one run.
 fn record(scenario: &Scenario, index: usize, run: &Run) -> Vec<Column> {
+    if let Some(sample_hz) = run.carrier_sample_hz() {
+        return displacement::record(scenario, index, run, sample_hz);
+    }
     let (count, every) = (scenario.control_samples(run), scenario.control_samples_per_row());
     let mut rows = Rows::default();
     if let Some(mut closed) = scenario.closed_loop(index) {
@@ -346,11 +419,12 @@ impl Rows {
     fn columns(self, s: &Settings, index: usize, run: &Run) -> Vec<Column> {
         let reference = match run {
             Run::Rotation { reference, .. } => *reference,
-            Run::Ringdown { .. } | Run::Virtual { .. } => Reference::Rate,
+            Run::Ringdown { .. } | Run::Decay { .. } | Run::Virtual { .. } => Reference::Rate,
         };
         // nobody records what turns an instrument without a table
         let bench = matches!(run, Run::Virtual { .. });
         let sensor = s.instrument == Instrument::Sensor;
+        let is_driven = !sensor && !matches!(run, Run::Decay { .. });
         let temperature =
             s.temperature.map(|t| self.t_s.iter().map(|time| t.start_of(index) + t.drift_k_per_s * time).collect());
         let commanded = self.rate_dps.iter().map(|rate| (rate * 1e9).round() / 1e9).collect();
@@ -363,8 +437,8 @@ impl Rows {
             ("xs_v", !sensor, x_s),
             ("yc_v", true, y_c),
             ("ys_v", !sensor, y_s),
-            ("vas_v", !sensor, v_as),
-            ("vqc_v", !sensor, v_qc),
+            ("vas_v", is_driven, v_as),
+            ("vqc_v", is_driven, v_qc),
             ("virtual_dps", bench, self.virtual_dps),
             ("theta_deg", s.theta_deg, self.theta_deg),
             ("temp_c", temperature.is_some(), temperature.unwrap_or_default()),

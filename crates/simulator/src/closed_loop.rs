@@ -66,6 +66,10 @@ pub struct Course {
     pub hold_rad: Option<f64>,
     /// the energy loop is off from this time on, s
     pub energy_off_s: Option<f64>,
+    /// no loop is closed and no force applied: the vibration rings freely
+    pub free: bool,
+    /// minor over major axis of the orbit at the start; signed
+    pub quadrature: f64,
     /// the loops run this many control samples before t = 0
     pub warm_up_samples: u64,
     /// temperature at t = 0 over the one that parameters refer to, K, and its drift, K/s
@@ -106,6 +110,7 @@ pub struct ClosedLoop {
     later_legs: Vec<Leg>,
     next_leg_at: u64,
     hold: Option<Heading<f64>>,
+    free: bool,
     energy_set_v2: f64,
     energy_off_at: u64,
     warm_up_samples: u64,
@@ -170,7 +175,7 @@ impl ClosedLoop {
         };
         let leg = legs.pop().unwrap_or_else(still);
         let a = course.amplitude_v;
-        let vibration = Orbit { a, q: 0.0, theta: course.start_rad, delta: 0.0 }.envelope();
+        let vibration = Orbit { a, q: a * course.quadrature, theta: course.start_rad, delta: 0.0 }.envelope();
         let hold_command = -a * design.resonator.damping_per_s / design.drive_per_s_v;
         let rest = Seen {
             t_s: 0.0,
@@ -186,6 +191,7 @@ impl ClosedLoop {
             leg,
             later_legs: legs,
             hold: course.hold_rad.and_then(|angle| Heading::new(angle).ok()),
+            free: course.free,
             energy_set_v2: a * a,
             energy_off_at: course
                 .energy_off_s
@@ -198,7 +204,7 @@ impl ClosedLoop {
                 && design.noise_v == 0.0
                 && wander.gains.is_none(),
             noise: (design.noise_v > 0.0).then_some(noise),
-            force_noise: (design.force_noise_v > 0.0).then_some(force_noise),
+            force_noise: (design.force_noise_v > 0.0 && !course.free).then_some(force_noise),
             wander,
             learner: None,
             precessing_v: 0.0,
@@ -290,6 +296,11 @@ impl ClosedLoop {
             let [r, c] = self.imperfect_readout(at);
             (Envelope::new(r.x_c, r.x_s, r.y_c, r.y_s), Envelope::new(c.x_c, c.x_s, c.y_c, c.y_s))
         };
+        if self.free {
+            self.seen =
+                Seen { t_s: at.t_s, readout, compensated, v_as: 0.0, v_qc: 0.0, v_qs: 0.0, correction_rad_s: 0.0 };
+            return AxisForces::default();
+        }
         let compensated = self.learner.as_ref().map_or(compensated, |l| l.readout(&compensated));
         let pendulum = compensated.pendulum();
         let major = direction::major_axis(&compensated, &pendulum);

@@ -15,7 +15,7 @@ use cvg_model::resonator::Resonator;
 use cvg_model::{AxisForces, Envelope, Real};
 use nalgebra::SMatrix;
 
-use crate::stages::{Setting, Stages, unit_envelopes};
+use crate::stages::{Setting, Spring, Stages, unit_envelopes};
 
 /// One period of the linear envelope under held forces: columns of Φ and Γ.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,6 +67,7 @@ impl ExactStep {
 pub struct Plant {
     exact: ExactStep,
     nonlinear: Vec<Setting>,
+    spring: Option<Spring>,
     angular_gain: f64,
     half_period_s: f64,
 }
@@ -91,6 +92,7 @@ impl Plant {
         Self {
             exact: ExactStep::new(linear, drive, period_s),
             nonlinear: stages.nonlinear.clone(),
+            spring: stages.spring,
             angular_gain: resonator.angular_gain,
             half_period_s: 0.5 * period_s,
         }
@@ -100,7 +102,7 @@ impl Plant {
     /// over the period).
     #[inline]
     pub fn step(&self, z: &Envelope<f64>, v: &AxisForces<f64>, deviation_rad_s: f64) -> Envelope<f64> {
-        if self.nonlinear.is_empty() && deviation_rad_s == 0.0 {
+        if self.is_linear() && deviation_rad_s == 0.0 {
             return self.exact.step(z, v);
         }
         // numbers in, numbers out: what the plain step works on then stays in registers
@@ -120,14 +122,21 @@ impl Plant {
         components(&self.half_nonlinear(after))
     }
 
+    #[inline]
+    fn is_linear(&self) -> bool {
+        self.nonlinear.is_empty() && self.spring.is_none()
+    }
+
     /// The nonlinear mechanics alone over half a period: one Runge–Kutta step of fourth order.
     fn half_nonlinear(&self, z: Envelope<f64>) -> Envelope<f64> {
-        if self.nonlinear.is_empty() {
+        if self.is_linear() {
             return z;
         }
         let h = self.half_period_s;
-        let rate =
-            |e: &Envelope<f64>| self.nonlinear.iter().fold(Envelope::zero(), |sum, (id, v)| sum + id.mechanics(v, e));
+        let rate = |e: &Envelope<f64>| {
+            let spring = self.spring.map_or(Envelope::zero(), |spring| spring.envelope_rate(e));
+            self.nonlinear.iter().fold(spring, |sum, (id, v)| sum + id.mechanics(v, e))
+        };
         let k1 = rate(&z);
         let k2 = rate(&(z + k1 * (0.5 * h)));
         let k3 = rate(&(z + k2 * (0.5 * h)));

@@ -4,6 +4,7 @@
 //! table. Both are found by trying the effect, not by its name, so that a new effect of the library needs no line here.
 
 use cvg_model::effects::{EffectId, Moment, Stage, Values};
+use cvg_model::resonator::envelope::{detuning, precession};
 use cvg_model::{AxisForces, Envelope};
 
 /// An effect with the values of its parameters.
@@ -20,10 +21,30 @@ pub struct Stages {
     pub linear: Vec<Setting>,
     /// mechanics that are not
     pub nonlinear: Vec<Setting>,
+    /// an isotropic nonlinear spring
+    pub spring: Option<Spring>,
     /// on the forces
     pub actuation: Vec<Setting>,
     /// on the readout
     pub readout: Vec<Setting>,
+}
+
+/// An isotropic nonlinear spring, averaged over the carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// c of θ̇ += cQ, rad/s/V²
+    pub precession: f64,
+    /// of ω += this times E, rad/s/V²
+    pub frequency: f64,
+}
+
+impl Spring {
+    /// The envelope's rate of change by it, V/s.
+    #[inline]
+    pub fn envelope_rate(&self, e: &Envelope<f64>) -> Envelope<f64> {
+        let p = e.pendulum();
+        precession(self.precession * p.q, e) + detuning(self.frequency * p.e, e)
+    }
 }
 
 impl Stages {

@@ -5,8 +5,10 @@ use cvg_model::effects::EffectId;
 use cvg_model::resonator::averaged::Averages;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{AxisForces, Envelope, Orbit};
+use cvg_simulator::carrier::CarrierPlant;
 use cvg_simulator::plant::{Plant, reference_ahead};
-use cvg_simulator::stages::{Setting, Stages};
+use cvg_simulator::scenario::IsotropicSpring;
+use cvg_simulator::stages::{Setting, Spring, Stages};
 use ode_solvers::{Dop853, System, Vector4};
 use proptest::prelude::*;
 
@@ -178,4 +180,71 @@ proptest! {
         let expected = Orbit { delta: delta - psi, ..orbit }.envelope();
         prop_assert!(distance(&seen, &expected) < 1e-13);
     }
+}
+
+/// x¨ = −x − βr²x, and likewise y, from an orbit that is an ellipse: (x, y, ẋ, ẏ).
+struct CubicForce {
+    beta: f64,
+}
+
+impl System<f64, Vector4<f64>> for CubicForce {
+    fn system(&self, _: f64, s: &Vector4<f64>, rate: &mut Vector4<f64>) {
+        let pull = 1.0 + self.beta * (s[0] * s[0] + s[1] * s[1]);
+        *rate = Vector4::new(s[2], s[3], -pull * s[0], -pull * s[1]);
+    }
+}
+
+#[test]
+fn the_spring_is_a_force_with_a_cubic_part_averaged() {
+    let (beta, periods) = (2e-4, 100);
+    let orbit = Orbit { a: 1.0, q: 0.3, theta: 0.4, delta: 0.0 }.envelope();
+    let mut s = Vector4::new(orbit.x_c, orbit.y_c, orbit.x_s, orbit.y_s);
+    // a piece at a time: the solver's own steps end where a piece does
+    let piece = core::f64::consts::TAU / 64.0;
+    for _ in 0..64 * periods {
+        let mut solver = Dop853::new(CubicForce { beta }, 0.0, piece, piece, s, 1e-13, 1e-14);
+        solver.integrate().expect("integrates");
+        s = *solver.y_out().last().expect("an end");
+    }
+    let end = core::f64::consts::TAU * f64::from(periods);
+    // whole periods of the linear oscillation later, the phase that is ahead is the spring's
+    let forced = Envelope::new(s[0], s[2], s[1], s[3]);
+    let spring = Spring { precession: -beta / 8.0, frequency: 3.0 * beta / 8.0 };
+    let set = IsotropicSpring { c: spring.precession, frequency_per_energy: None };
+    assert_abs_diff_eq!(set.frequency_per_energy(), spring.frequency, epsilon = 1e-18);
+    let free = Resonator { damping_per_s: 0.0, angular_gain: 0.0, ..resonator() };
+    let stages = Stages { spring: Some(spring), ..Stages::default() };
+    let (steps, mut averaged) = (200, orbit);
+    let plant = Plant::new(&free, &stages, 0.0, 0.0, 1.0, end / f64::from(steps));
+    for _ in 0..steps {
+        averaged = plant.step(&averaged, &AxisForces::default(), 0.0);
+    }
+    let [forced_p, averaged_p, before] = [forced, averaged, orbit].map(|e| e.pendulum());
+    let turned = averaged_p.angle() - before.angle();
+    assert!(turned.abs() > 5e-3, "{turned}");
+    // the average is of first order: what it leaves is β of it
+    assert_abs_diff_eq!(forced_p.angle(), averaged_p.angle(), epsilon = 5e-4 * turned.abs() + 5e-4 * beta);
+    assert!(distance(&forced, &averaged) < 5.0 * beta, "{}", distance(&forced, &averaged));
+    assert!(distance(&orbit, &averaged) > 0.04);
+}
+
+#[test]
+fn a_spring_at_the_carrier_turns_and_speeds_up_as_its_envelope_does() {
+    let spring = Spring { precession: 0.8, frequency: -2.4 };
+    let ring = Resonator { damping_per_s: 0.0, angular_gain: 0.0, centrifugal_gain: 0.0, ..resonator() };
+    let orbit = Orbit { a: 1.0, q: 0.3, theta: 0.4, delta: 0.0 }.envelope();
+    let samples = 20_000_u32;
+    // the sample rate is ten times the carrier: after whole periods the linear phase is where it was
+    let period_s = 1.0 / 152_000.0;
+    let mut carrier = CarrierPlant::new(&ring, [1.0; 2], period_s, 0.0);
+    carrier.set_vibration(&orbit);
+    for _ in 0..samples {
+        carrier.step([0.0; 2], [0.0; 2]);
+        carrier.bend(&spring);
+    }
+    let stages = Stages { spring: Some(spring), ..Stages::default() };
+    let plant = Plant::new(&ring, &stages, 0.0, 0.0, 1.0, period_s * f64::from(samples) / 100.0);
+    let averaged = (0..100).fold(orbit, |e, _| plant.step(&e, &AxisForces::default(), 0.0));
+    assert!(distance(&orbit, &averaged) > 0.2);
+    assert!(distance(&carrier.vibration(), &averaged) < 1e-8, "{}", distance(&carrier.vibration(), &averaged));
 }

@@ -32,7 +32,7 @@ fn the_papers_scenario_has_the_runs_that_its_method_needs() {
         .map(|run| match run {
             Run::Rotation { rate_dps, amplitude, purpose, .. } => (*rate_dps, *amplitude, *purpose == Purpose::Fit),
             Run::Ringdown { angle_deg, .. } => (*angle_deg, 0.0, true),
-            Run::Virtual { .. } => unreachable!("the paper has a table"),
+            Run::Virtual { .. } | Run::Decay { .. } => unreachable!("the paper has a table"),
         })
         .collect();
     assert_eq!(
@@ -215,6 +215,138 @@ fn what_makes_no_sense_is_refused_with_the_key_and_what_would_be_right() {
         ("device = \"t\"\nangular_gain = 0.7\nrun = []\n".to_owned(), "at least one [[run]]"),
     ] {
         let error = refusal(&text);
+        assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");
+    }
+}
+
+const DECAY: &str = r#"device = "ring"
+angular_gain = 0.78
+carrier_hz = 15200.0
+[[run]]
+kind = "decay"
+file = "envelope.csv"
+start_deg = 30.0
+quadrature = 0.1
+rate_dps = 10.0
+duration_s = 2.0
+[[run]]
+kind = "decay"
+file = "carrier.parquet"
+start_deg = 30.0
+quadrature = 0.1
+rate_dps = 10.0
+duration_s = 0.02
+carrier_sample_hz = 100000.0
+"#;
+
+#[test]
+fn a_decay_is_the_resonator_alone() {
+    let simulated = Scenario::parse(DECAY).expect("valid").simulate();
+    let ring = by_file(&simulated.runs, "envelope.csv");
+    let names: Vec<_> = ring.columns.iter().map(|c| c.name).collect();
+    assert_eq!(names, ["t_s", "rate_dps", "xc_v", "xs_v", "yc_v", "ys_v"]);
+    for (t, e) in column(ring, "t_s").iter().zip(envelopes(ring)) {
+        let p = e.pendulum();
+        let energy = (1.0 + 0.01) * (-2.0 * t / 22.0).exp();
+        assert_abs_diff_eq!(p.e, energy, epsilon = 1e-12);
+        assert_abs_diff_eq!(p.q, 0.2 / 1.01 * energy, epsilon = 1e-12);
+        assert_abs_diff_eq!(p.angle().to_degrees(), 30.0 - 0.78 * 10.0 * t, epsilon = 1e-9);
+    }
+}
+
+#[test]
+fn displacements_are_the_vibration_itself() {
+    let simulated = Scenario::parse(DECAY).expect("valid").simulate();
+    let ring = by_file(&simulated.runs, "carrier.parquet");
+    let names: Vec<_> = ring.columns.iter().map(|c| c.name).collect();
+    assert_eq!(names, ["t_s", "x_v", "y_v"]);
+    let (t, x, y) = (column(ring, "t_s"), column(ring, "x_v"), column(ring, "y_v"));
+    assert_eq!(t.len(), 2000);
+    // a step of the converters, and what the Coriolis force does to the frequency, is left
+    for i in 0..t.len() {
+        let start = cvg_model::Orbit { a: 1.0, q: 0.1, theta: (30.0 - 7.8 * t[i]).to_radians(), delta: 0.0 }.envelope();
+        let (sin, cos) = (core::f64::consts::TAU * 15_200.0 * t[i]).sin_cos();
+        let shrunk = (-t[i] / 22.0).exp();
+        assert_abs_diff_eq!(x[i], shrunk * (start.x_c * cos + start.x_s * sin), epsilon = 3e-5);
+        assert_abs_diff_eq!(y[i], shrunk * (start.y_c * cos + start.y_s * sin), epsilon = 3e-5);
+    }
+    // the rate stands in the campaign, where it is no column
+    let campaign: toml::Table = simulated.campaign_toml().parse().expect("TOML");
+    let rates =
+        campaign["run"].as_array().expect("runs").iter().map(|r| r.get("rate_dps").and_then(toml::Value::as_float));
+    assert_eq!(rates.collect::<Vec<_>>(), [None, Some(10.0)]);
+}
+
+#[test]
+fn a_rotation_at_the_carrier_begins_when_its_electronics_have_settled() {
+    let text = minimal("carrier_hz = 15200.0", "profile = \"there-and-back\"\ncarrier_sample_hz = 50000.0");
+    let run = only_run(&text.replace("duration_s = 1.0", "duration_s = 0.1"));
+    let names: Vec<_> = run.columns.iter().map(|c| c.name).collect();
+    assert_eq!(names, ["t_s", "rate_dps", "x_v", "y_v", "vas_v", "vqc_v"]);
+    let (x, y) = (column(&run, "x_v"), column(&run, "y_v"));
+    let mean_square = x.iter().zip(y).map(|(x, y)| x * x + y * y).sum::<f64>() / x.len() as f64;
+    assert_abs_diff_eq!(mean_square, 0.5, epsilon = 1e-3);
+    assert_eq!(column(&run, "rate_dps")[2499..2501], [100.0, -100.0]);
+    // an output that is held for a sample has sin(ωT/2)/(ωT/2) of the carrier in it
+    let half = core::f64::consts::PI * 15_200.0 / 50_000.0;
+    assert_abs_diff_eq!(column(&run, "vas_v")[0], -1.0 / 22.0 * half / half.sin(), epsilon = 1e-3);
+}
+
+#[test]
+fn what_is_written_run_by_run_is_what_is_written_at_once() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let scenario = Scenario::parse(DECAY).expect("valid");
+    scenario.write(dir.path().join("one")).expect("written");
+    scenario.simulate().write(dir.path().join("all")).expect("written");
+    for file in ["campaign.toml", "truth.toml", "envelope.csv", "carrier.parquet"] {
+        let [one, all] = ["one", "all"].map(|of| std::fs::read(dir.path().join(of).join(file)).expect("there"));
+        assert_eq!(one, all, "{file}");
+    }
+}
+
+#[test]
+fn the_truth_has_the_spring() {
+    let text = DECAY.replace("carrier_hz", "spring_isotropic = { c = 0.01 }\ncarrier_hz");
+    let truth: toml::Table = Scenario::parse(&text).expect("valid").simulate().truth_toml().parse().expect("TOML");
+    assert_eq!(truth["undeclared"].as_array().expect("a list")[0].as_str(), Some("spring-isotropic"));
+    assert_eq!(truth["effect"].as_array().expect("a list")[0]["frequency_per_energy"].as_float(), Some(-0.03));
+}
+
+#[test]
+fn what_is_not_built_at_the_carrier_is_refused() {
+    for (from, to, wanted) in [
+        ("carrier_hz = 15200.0", "", "carrier_sample_hz: the scenario has no carrier_hz"),
+        (
+            "angular_gain = 0.78",
+            "angular_gain = 0.78\ngain_flicker = 1e-4",
+            "gain_flicker: is not built at the carrier",
+        ),
+        (
+            "angular_gain = 0.78",
+            "angular_gain = 0.78\neffects = [{ id = \"detection-skew\", skew = 0.1 }]",
+            "the effect detection-skew is not built at the carrier",
+        ),
+        ("100000.0", "99999.0", "carrier_sample_hz: 99999 is no multiple of control_hz = 2000"),
+        ("100000.0", "nan", "carrier_sample_hz: NaN has to be finite and positive"),
+        ("100000.0", "2e10", "duration_s: is too long for one recording"),
+        ("angular_gain = 0.78", "angular_gain = 0.78\namplitude_v = 9.0", "amplitude_v"),
+        ("quadrature = 0.1", "quadrature = 1.5", "quadrature: 1.5 is outside [-1, 1]"),
+        ("start_deg = 30.0", "start_deg = inf", "start_deg: inf is not a finite number"),
+        ("angular_gain = 0.78", "angular_gain = 0.78\nspring_isotropic = { c = nan }", "spring_isotropic.c: NaN"),
+        ("angular_gain = 0.78", "angular_gain = 1.0\ninstrument = \"sensor\"", "a sensor has nothing that rings"),
+        ("carrier.parquet", "carrier.hdf5", "ends in .csv or .parquet"),
+    ] {
+        let error = refusal(&DECAY.replace(from, to));
+        assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");
+    }
+    let rotation = |keys: &str, run: &str| refusal(&minimal(&format!("carrier_hz = 15200.0\n{keys}"), run));
+    let at_carrier = "carrier_sample_hz = 50000.0";
+    for (keys, run, wanted) in [
+        ("", "start_deg = 3.0", "start_deg: is up to the electronics"),
+        ("", "reference = \"table\"", "reference: is \"rate\" at the carrier"),
+        ("drive_per_s_v = 1e-6", "", "a.csv: the device did not start"),
+    ] {
+        let error = rotation(keys, &format!("{run}\n{at_carrier}"));
         assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");
     }
 }

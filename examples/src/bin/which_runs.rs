@@ -58,7 +58,9 @@ fn row(name: &str, report: &Report) -> String {
 fn stretched(run: &Run, by: f64) -> Run {
     let mut run = run.clone();
     match &mut run {
-        Run::Rotation { duration_s, .. } | Run::Virtual { duration_s, .. } => *duration_s *= by,
+        Run::Rotation { duration_s, .. } | Run::Decay { duration_s, .. } | Run::Virtual { duration_s, .. } => {
+            *duration_s *= by;
+        }
         Run::Ringdown { duration_s, energy_off_s, .. } => {
             *duration_s = *energy_off_s + (*duration_s - *energy_off_s) * by;
         }

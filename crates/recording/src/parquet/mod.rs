@@ -16,7 +16,7 @@ pub use lake::Lake;
 #[cfg(feature = "parquet")]
 pub(super) use read::read;
 #[cfg(feature = "parquet")]
-pub use write::write_parquet;
+pub use write::{write_parquet, write_parquet_numbers};
 
 /// In the place of the reader where it is not built in.
 #[cfg(not(feature = "parquet"))]

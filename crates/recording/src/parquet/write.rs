@@ -37,10 +37,25 @@ pub fn write_parquet(columns: &[(String, Values)], writer: impl Write + Send) ->
             Values::Texts(cells) => (name.as_str(), Outlet::Texts(cells)),
         })
         .collect();
+    even(&outlets)?;
+    write(&outlets, writer).map_err(io::Error::other)
+}
+
+/// Writes columns of numbers, borrowed, as Parquet, in their order.
+///
+/// # Errors
+/// As [`write_parquet`].
+pub fn write_parquet_numbers(columns: &[(&str, &[f64])], writer: impl Write + Send) -> io::Result<()> {
+    let outlets: Vec<(&str, Outlet<'_>)> = columns.iter().map(|(name, v)| (*name, Outlet::Numbers(v))).collect();
+    even(&outlets)?;
+    write(&outlets, writer).map_err(io::Error::other)
+}
+
+fn even(outlets: &[(&str, Outlet<'_>)]) -> io::Result<()> {
     if outlets.windows(2).any(|w| w[0].1.len() != w[1].1.len()) {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the columns differ in length"));
     }
-    write(&outlets, writer).map_err(io::Error::other)
+    Ok(())
 }
 
 fn write(outlets: &[(&str, Outlet<'_>)], writer: impl Write + Send) -> Result<(), ParquetError> {

@@ -14,7 +14,8 @@ use cvg_model::resonator::Anisotropy;
 use super::{CarrierDevice, CarrierLoop};
 use crate::campaign::{Column, Simulated, SimulatedRun};
 use crate::scenario::Tuning as ScenarioTuning;
-use crate::scenario::{Run, Scenario};
+use crate::scenario::{Run, Scenario, spring};
+use crate::stages::Spring;
 
 /// Why a scenario cannot be recorded at the carrier.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -49,6 +50,11 @@ const SETTLE_S: f64 = 5.0;
 /// # Errors
 /// An effect that is not built at the carrier, a scenario without a carrier.
 pub fn device(scenario: &Scenario) -> Result<CarrierDevice, NotAtCarrier> {
+    device_at(scenario, SAMPLE_HZ)
+}
+
+/// The same behind converters of the rate `sample_hz`.
+pub(super) fn device_at(scenario: &Scenario, sample_hz: f64) -> Result<CarrierDevice, NotAtCarrier> {
     let s = scenario.settings();
     let carrier_hz = s.carrier_hz.ok_or(NotAtCarrier::Scenario("the scenario has no carrier_hz"))?;
     let mut device = CarrierDevice { seed: s.seed, ..CarrierDevice::default() };
@@ -73,8 +79,9 @@ pub fn device(scenario: &Scenario) -> Result<CarrierDevice, NotAtCarrier> {
         }
     }
     // white noise of a control sample is that of N samples, averaged by the mixers
-    let window = SAMPLE_HZ / s.control_hz;
+    let window = sample_hz / s.control_hz;
     device.noise_v = s.noise_v * (0.5 * window).sqrt();
+    device.drive_delay_s = device.drive_delay_s.min(1.0 / sample_hz);
     Ok(device)
 }
 
@@ -93,42 +100,16 @@ pub fn record(scenario: &Scenario) -> Result<Simulated, NotAtCarrier> {
 }
 
 fn record_run(scenario: &Scenario, device: &CarrierDevice, run: &Run) -> Result<Vec<Column>, NotAtCarrier> {
-    let s = scenario.settings();
-    let tuning = |t: &ScenarioTuning| Tuning { bandwidth_hz: t.bandwidth_hz, damping: t.damping };
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some tens of samples")]
-    let window = (SAMPLE_HZ / s.control_hz).round() as u16;
     let (rate_dps, hold_deg, off_s) = match run {
         Run::Rotation { rate_dps, profile: crate::scenario::Profile::Constant, .. } => (*rate_dps, None, f64::INFINITY),
         Run::Rotation { .. } => return Err(NotAtCarrier::Scenario("only constant rates are recorded at the carrier")),
         Run::Virtual { .. } => return Err(NotAtCarrier::Scenario("virtual precession is not recorded at the carrier")),
+        Run::Decay { .. } => return Err(NotAtCarrier::Scenario("a free decay has no electronics that record it")),
         Run::Ringdown { angle_deg, energy_off_s, .. } => (0.0, Some(*angle_deg), *energy_off_s),
     };
-    let settings = Settings {
-        carrier_hz: s.carrier_hz.unwrap_or_default(),
-        sample_hz: SAMPLE_HZ,
-        window,
-        amplitude_v: s.amplitude_v * run.amplitude(),
-        drive_per_s_v: s.drive_per_s_v,
-        energy: tuning(&s.loops.energy),
-        quadrature: tuning(&s.loops.quadrature),
-        phase: tuning(&s.loops.phase),
-        rate: tuning(&s.loops.rate),
-        hold_rad: hold_deg.unwrap_or(0.0).to_radians(),
-        ..Settings::default()
-    };
-    let mut closed = CarrierLoop::<f64>::new(device, &settings).map_err(NotAtCarrier::Settings)?;
-    let wish = if hold_deg.is_some() { Wish::Hold } else { Wish::WholeAngle };
-    closed.state.wish(wish);
-    closed.plant.set_rate(rate_dps.to_radians());
-    let steps = |time_s: f64| crate::closed_loop::samples(time_s, settings.window_s());
-    for _ in 0..steps(START_S + SETTLE_S) {
-        control_step(&mut closed);
-    }
-    let operating = if hold_deg.is_some() { Mode::Hold } else { Mode::WholeAngle };
-    let mode = closed.state.supervisor.mode;
-    if mode != operating {
-        return Err(NotAtCarrier::NoStart { file: run.file().to_owned(), mode });
-    }
+    let settings = settings_at(scenario, run, hold_deg, SAMPLE_HZ);
+    let spring = spring(scenario.settings());
+    let mut closed = started(device, &settings, run, rate_dps, spring)?;
     let names = ["t_s", "rate_dps", "xc_v", "xs_v", "yc_v", "ys_v", "vas_v", "vqc_v"];
     let mut columns = names.map(|name| Column { name, values: Vec::new() });
     let (every, off_at) = (scenario.control_samples_per_row(), off_s / settings.window_s());
@@ -138,7 +119,7 @@ fn record_run(scenario: &Scenario, device: &CarrierDevice, run: &Run) -> Result<
         if at >= off_at {
             closed.state.wish(Wish::RingDown);
         }
-        control_step(&mut closed);
+        control_step(&mut closed, spring);
         if k % every == 0 {
             let (seen, z) = (&closed.state.seen, &closed.state.seen.readout);
             let row = [at * settings.window_s(), rate_dps, z.x_c, z.x_s, z.y_c, z.y_s, seen.v_as, seen.v_qc];
@@ -150,7 +131,63 @@ fn record_run(scenario: &Scenario, device: &CarrierDevice, run: &Run) -> Result<
     Ok(columns.into())
 }
 
+/// The electronics of a run, with converters of the rate `sample_hz`.
+pub(super) fn settings_at(scenario: &Scenario, run: &Run, hold_deg: Option<f64>, sample_hz: f64) -> Settings<'static> {
+    let s = scenario.settings();
+    let tuning = |t: &ScenarioTuning| Tuning { bandwidth_hz: t.bandwidth_hz, damping: t.damping };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some tens of samples; saturating")]
+    let window = (sample_hz / s.control_hz).round() as u16;
+    let usual = Settings::default();
+    Settings {
+        carrier_hz: s.carrier_hz.unwrap_or_default(),
+        sample_hz,
+        window,
+        drive_delay_s: usual.drive_delay_s.min(1.0 / sample_hz),
+        amplitude_v: s.amplitude_v * run.amplitude(),
+        drive_per_s_v: s.drive_per_s_v,
+        energy: tuning(&s.loops.energy),
+        quadrature: tuning(&s.loops.quadrature),
+        phase: tuning(&s.loops.phase),
+        rate: tuning(&s.loops.rate),
+        hold_rad: hold_deg.unwrap_or(0.0).to_radians(),
+        ..usual
+    }
+}
+
+/// The electronics of `settings` on `device`, started from rest and settled: held where they are to hold.
+///
+/// # Errors
+/// Settings that are refused, a device that does not start.
+pub(super) fn started(
+    device: &CarrierDevice,
+    settings: &Settings<'_>,
+    run: &Run,
+    rate_dps: f64,
+    spring: Option<Spring>,
+) -> Result<CarrierLoop<f64>, NotAtCarrier> {
+    let mut closed = CarrierLoop::<f64>::new(device, settings).map_err(NotAtCarrier::Settings)?;
+    let (wish, operating) = match run {
+        Run::Ringdown { .. } => (Wish::Hold, Mode::Hold),
+        _ => (Wish::WholeAngle, Mode::WholeAngle),
+    };
+    closed.state.wish(wish);
+    closed.plant.set_rate(rate_dps.to_radians());
+    for _ in 0..crate::closed_loop::samples(START_S + SETTLE_S, settings.window_s()) {
+        control_step(&mut closed, spring);
+    }
+    let mode = closed.state.supervisor.mode;
+    if mode == operating { Ok(closed) } else { Err(NotAtCarrier::NoStart { file: run.file().to_owned(), mode }) }
+}
+
 /// Samples up to and including the one with which a control step is made.
-fn control_step(closed: &mut CarrierLoop<f64>) {
-    while !closed.step().fresh {}
+fn control_step(closed: &mut CarrierLoop<f64>, spring: Option<Spring>) {
+    loop {
+        let status = closed.step();
+        if let Some(spring) = &spring {
+            closed.plant.bend(spring);
+        }
+        if status.fresh {
+            return;
+        }
+    }
 }

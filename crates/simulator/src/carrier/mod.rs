@@ -7,6 +7,7 @@
 
 pub mod campaign;
 pub mod converter;
+pub(crate) mod displacement;
 pub mod plant;
 
 use cvg_instrument::{Instrument, Settings, State, Status};
@@ -161,9 +162,10 @@ impl<T: Float> CarrierLoop<T> {
         status
     }
 
-    /// One sample in which the electronics stand still and the drives hold their output.
-    pub fn step_without_electronics(&mut self) {
-        let _ = self.readout(self.plant.state());
+    /// One sample in which the electronics stand still and the drives hold their output; what the converters read, V.
+    pub fn step_without_electronics(&mut self) -> [f64; 2] {
+        let readings = self.readout(self.plant.state());
         self.plant.step(self.output_v(), self.output_v());
+        readings
     }
 }

@@ -18,6 +18,9 @@ use cvg_model::resonator::carrier::Motion;
 use cvg_model::{Envelope, Real};
 use nalgebra::{Matrix4, Matrix4x2, SMatrix};
 
+use crate::plant::reference_ahead;
+use crate::stages::Spring;
+
 /// The resonator between two samples of the converters.
 #[derive(Clone, Debug)]
 pub struct CarrierPlant {
@@ -108,6 +111,15 @@ impl CarrierPlant {
         let turned = self.half_turn(self.vibration, rate_rad_s);
         let moved = self.still.apply(&turned, before.map(|v| [v; 2]), after);
         self.vibration = self.half_turn(moved, rate_rad_s);
+    }
+
+    /// What an isotropic nonlinear spring does in a sample: the pattern turned by cQT, the phase by as much as goes with E.
+    #[inline]
+    pub fn bend(&mut self, spring: &Spring) {
+        let e = self.vibration();
+        let p = e.pendulum();
+        let (sin, cos) = Real::sin_cos(spring.precession * p.q * self.period_s);
+        self.set_vibration(&reference_ahead(&e.turned(sin, cos), -spring.frequency * p.e * self.period_s));
     }
 
     /// Half a sample of what goes with the rate.

@@ -7,7 +7,7 @@ use cvg_model::effects::Stage;
 use super::{EffectSetting, Instrument, Run, ScenarioError, Settings, Tuning};
 
 /// The longest recording, rows.
-const MOST_ROWS: f64 = 1e7;
+const MOST_ROWS: f64 = 2e7;
 
 /// A gain that wanders further would change its sign.
 const LARGEST_WANDER: f64 = 0.03;
@@ -75,6 +75,13 @@ pub(super) fn settings(s: &Settings) -> Result<(), ScenarioError> {
     {
         self::tuning(name, &tuning)?;
     }
+    if let Some(spring) = &s.spring_isotropic {
+        finite("spring_isotropic.c", spring.c)?;
+        finite("spring_isotropic.frequency_per_energy", spring.frequency_per_energy())?;
+        if s.instrument == Instrument::Sensor {
+            return Err(ScenarioError::invalid("spring_isotropic", "a sensor has no spring"));
+        }
+    }
     effects(s)?;
     runs(s)
 }
@@ -121,11 +128,12 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
         }
         positive(&field("duration_s"), run.duration_s())?;
         positive(&field("amplitude"), run.amplitude())?;
-        if run.duration_s() * s.sample_hz > MOST_ROWS || (run.duration_s() + s.warm_up_s) * s.control_hz > MOST_SAMPLES
-        {
+        positive(&field("carrier_sample_hz"), run.carrier_sample_hz().unwrap_or(1.0))?;
+        let rows_hz = run.carrier_sample_hz().unwrap_or(s.sample_hz);
+        if run.duration_s() * rows_hz > MOST_ROWS || (run.duration_s() + s.warm_up_s) * s.control_hz > MOST_SAMPLES {
             return Err(ScenarioError::invalid(field("duration_s"), "is too long for one recording"));
         }
-        if run.duration_s() * s.sample_hz < 1.0 {
+        if run.duration_s() * rows_hz < 1.0 {
             return Err(ScenarioError::invalid(field("duration_s"), "is shorter than one row"));
         }
         match run {
@@ -142,6 +150,19 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
                 not_negative(&field("energy_off_s"), *energy_off_s)?;
                 if energy_off_s >= duration_s {
                     return Err(ScenarioError::invalid(field("energy_off_s"), "has to be before the end of the run"));
+                }
+            }
+            Run::Decay { start_deg, quadrature, rate_dps, .. } => {
+                if s.instrument == Instrument::Sensor {
+                    return Err(ScenarioError::invalid(field("kind"), "a sensor has nothing that rings"));
+                }
+                finite(&field("start_deg"), *start_deg)?;
+                finite(&field("rate_dps"), *rate_dps)?;
+                if !(-1.0..=1.0).contains(quadrature) {
+                    return Err(ScenarioError::invalid(
+                        field("quadrature"),
+                        format!("{quadrature} is outside [-1, 1]: the minor axis is no longer than the major one"),
+                    ));
                 }
             }
             Run::Virtual { virtual_dps, reversal_s, turned, settle_s, .. } => {
@@ -167,8 +188,11 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
 /// A plain name in the campaign's own folder.
 fn file_name(name: &str) -> Result<(), String> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "+-_.".contains(c));
-    if name.is_empty() || !plain || name.starts_with('.') || !name.ends_with(".csv") {
-        return Err(format!("{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv"));
+    let ends = [".csv", ".parquet"].iter().any(|end| name.ends_with(end));
+    if name.is_empty() || !plain || name.starts_with('.') || !ends {
+        return Err(format!(
+            "{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv or .parquet"
+        ));
     }
     Ok(())
 }

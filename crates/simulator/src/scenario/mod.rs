@@ -2,6 +2,7 @@
 //!
 //! [`Settings`] is the file; a [`Scenario`] exists only if its settings make sense, so simulating it cannot fail.
 
+mod carrier;
 mod check;
 mod effect;
 mod settings;
@@ -15,10 +16,12 @@ use crate::closed_loop::{ClosedLoop, Course, Design, samples};
 use crate::flicker::{Flicker, Wander};
 use crate::noise::Noise;
 use crate::sensor::Sensor;
-use crate::stages::{Setting, Stages};
+use crate::stages::{Setting, Spring, Stages};
 
 pub use effect::EffectSetting;
-pub use settings::{Instrument, Loops, Profile, Purpose, Reference, Run, Settings, Temperature, Tuning};
+pub use settings::{
+    Instrument, IsotropicSpring, Loops, Profile, Purpose, Reference, Run, Settings, Temperature, Tuning,
+};
 
 use core::f64::consts::TAU;
 
@@ -76,7 +79,9 @@ impl Scenario {
     pub fn new(settings: Settings) -> Result<Self, ScenarioError> {
         check::settings(&settings)?;
         let design = design(&settings)?;
-        Ok(Self { settings, design })
+        let scenario = Self { settings, design };
+        carrier::check(&scenario)?;
+        Ok(scenario)
     }
 
     /// The paper's device under the runs that its method needs: [`PAPER`], the file shipped with this crate.
@@ -157,6 +162,17 @@ impl Scenario {
         let warm_up_samples = samples(self.settings.warm_up_s, self.design.period_s);
         let warmer = self.settings.temperature.map(|t| [t.start_of(index) - t.reference_c, t.drift_k_per_s]);
         let warmer = warmer.unwrap_or_default();
+        let still = Course {
+            legs: vec![(0, 0.0)],
+            amplitude_v,
+            start_rad: random_rad,
+            hold_rad: None,
+            energy_off_s: None,
+            free: false,
+            quadrature: 0.0,
+            warm_up_samples,
+            warmer,
+        };
         match run {
             Run::Rotation { rate_dps, profile, start_deg, .. } => {
                 let rate = rate_dps.to_radians();
@@ -164,26 +180,23 @@ impl Scenario {
                     Profile::Constant => vec![(0, rate)],
                     Profile::ThereAndBack => vec![(0, rate), (self.control_samples(run) / 2, -rate)],
                 };
-                let start_rad = start_deg.map_or(random_rad, f64::to_radians);
-                Course { legs, amplitude_v, start_rad, hold_rad: None, energy_off_s: None, warm_up_samples, warmer }
+                Course { legs, start_rad: start_deg.map_or(random_rad, f64::to_radians), ..still }
             }
-            Run::Virtual { .. } => Course {
-                legs: vec![(0, 0.0)],
-                amplitude_v,
-                start_rad: random_rad,
-                hold_rad: None,
-                energy_off_s: None,
-                warm_up_samples,
-                warmer,
+            Run::Decay { rate_dps, start_deg, quadrature, .. } => Course {
+                legs: vec![(0, rate_dps.to_radians())],
+                start_rad: start_deg.to_radians(),
+                free: true,
+                quadrature: *quadrature,
+                // nothing settles in what is not driven
+                warm_up_samples: 0,
+                ..still
             },
+            Run::Virtual { .. } => still,
             Run::Ringdown { angle_deg, energy_off_s, .. } => Course {
-                legs: vec![(0, 0.0)],
-                amplitude_v,
                 start_rad: angle_deg.to_radians(),
                 hold_rad: Some(angle_deg.to_radians()),
                 energy_off_s: Some(*energy_off_s),
-                warm_up_samples,
-                warmer,
+                ..still
             },
         }
     }
@@ -194,6 +207,11 @@ pub const PAPER: &str = include_str!("../../scenarios/paper.toml");
 
 /// The shipped scenario of a Hall sensor pair on a ring of 25 pole pairs.
 pub const SENSOR: &str = include_str!("../../scenarios/sensor.toml");
+
+/// The isotropic nonlinear spring, if there is one.
+pub(crate) fn spring(s: &Settings) -> Option<Spring> {
+    s.spring_isotropic.map(|spring| Spring { precession: spring.c, frequency: spring.frequency_per_energy() })
+}
 
 /// The device and its electronics, by the tuning rules of the controllers.
 fn design(s: &Settings) -> Result<Design, ScenarioError> {
@@ -218,7 +236,7 @@ fn design(s: &Settings) -> Result<Design, ScenarioError> {
             anisodamping: Anisotropy::none(),
             anisoelasticity: Anisotropy::none(),
         },
-        stages: Stages::new(&pairs(&s.effects)),
+        stages: Stages { spring: spring(s), ..Stages::new(&pairs(&s.effects)) },
         ahead_rad_s: TAU * s.detuning_hz,
         drive_per_s_v: s.drive_per_s_v,
         period_s,

@@ -15,7 +15,7 @@ pub struct Settings {
     /// what kind of instrument it is
     #[serde(default)]
     pub instrument: Instrument,
-    /// carrier frequency, Hz; only passed on to the campaign
+    /// carrier frequency, Hz; passed on to the campaign, and what runs with a `carrier_sample_hz` vibrate at
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carrier_hz: Option<f64>,
     /// decay time of the amplitude, s (gyroscope)
@@ -68,6 +68,9 @@ pub struct Settings {
     /// the recordings have a temperature that drifts like this
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<Temperature>,
+    /// an isotropic nonlinear spring (gyroscope)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spring_isotropic: Option<IsotropicSpring>,
     /// tuning of the loops (gyroscope)
     #[serde(default)]
     pub loops: Loops,
@@ -115,6 +118,28 @@ impl Temperature {
     #[allow(clippy::cast_precision_loss, reason = "no scenario has 2^53 runs")]
     pub fn start_of(&self, index: usize) -> f64 {
         self.start_c + self.step_k * index as f64
+    }
+}
+
+/// A spring whose force is not in proportion to the displacement, the same in all directions: the pattern precesses with its
+/// quadrature, and the frequency follows the energy.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IsotropicSpring {
+    /// θ̇ += cQ, rad/s/V²
+    pub c: f64,
+    /// ω += this times E, rad/s/V²; not given, it is −3c, that of a force with a cubic part
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frequency_per_energy: Option<f64>,
+}
+
+impl IsotropicSpring {
+    /// How ω goes with E, rad/s/V².
+    ///
+    /// A force −βr²(x, y) beside the linear one has the mean energy β(3E² − Q²)/32, whose slopes over the actions ½ωE and ½ωQ are
+    /// 3βE/8ω of the phase and −βQ/8ω of the pattern.
+    pub fn frequency_per_energy(&self) -> f64 {
+        self.frequency_per_energy.unwrap_or(-3.0 * self.c)
     }
 }
 
@@ -183,6 +208,9 @@ pub enum Run {
         /// angle of the pattern at the start, deg; random if not given
         #[serde(default, skip_serializing_if = "Option::is_none")]
         start_deg: Option<f64>,
+        /// the displacements themselves are recorded, `x_v` and `y_v`, at so many samples a second
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        carrier_sample_hz: Option<f64>,
     },
     /// the table stands, the rate loop holds the pattern, the energy loop is switched off
     Ringdown {
@@ -197,6 +225,30 @@ pub enum Run {
         /// set amplitude relative to `amplitude_v`
         #[serde(default = "defaults::one")]
         amplitude: f64,
+    },
+    /// no loops and no forces: the vibration rings freely
+    Decay {
+        /// name of the recording in the campaign's folder
+        file: String,
+        /// angle of the pattern at the start, deg
+        start_deg: f64,
+        /// minor over major axis of the orbit at the start; signed
+        #[serde(default)]
+        quadrature: f64,
+        /// input rate, deg/s
+        #[serde(default)]
+        rate_dps: f64,
+        /// length, s
+        duration_s: f64,
+        /// amplitude at the start relative to `amplitude_v`
+        #[serde(default = "defaults::one")]
+        amplitude: f64,
+        /// what the run is for
+        #[serde(default, rename = "use")]
+        purpose: Purpose,
+        /// the displacements themselves are recorded, `x_v` and `y_v`, at so many samples a second
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        carrier_sample_hz: Option<f64>,
     },
     /// no table: the pattern is precessed to and fro by the instrument's own forces, and turned by whoever turns it, which is
     /// not recorded
@@ -225,7 +277,7 @@ pub enum Run {
     },
 }
 
-/// What a rotation run is for.
+/// What a run is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Purpose {
@@ -264,7 +316,10 @@ impl Run {
     /// Name of the recording.
     pub fn file(&self) -> &str {
         match self {
-            Self::Rotation { file, .. } | Self::Ringdown { file, .. } | Self::Virtual { file, .. } => file,
+            Self::Rotation { file, .. }
+            | Self::Ringdown { file, .. }
+            | Self::Decay { file, .. }
+            | Self::Virtual { file, .. } => file,
         }
     }
 
@@ -273,6 +328,7 @@ impl Run {
         match self {
             Self::Rotation { duration_s, .. }
             | Self::Ringdown { duration_s, .. }
+            | Self::Decay { duration_s, .. }
             | Self::Virtual { duration_s, .. } => *duration_s,
         }
     }
@@ -280,9 +336,18 @@ impl Run {
     /// Set amplitude relative to the device's.
     pub fn amplitude(&self) -> f64 {
         match self {
-            Self::Rotation { amplitude, .. } | Self::Ringdown { amplitude, .. } | Self::Virtual { amplitude, .. } => {
-                *amplitude
-            }
+            Self::Rotation { amplitude, .. }
+            | Self::Ringdown { amplitude, .. }
+            | Self::Decay { amplitude, .. }
+            | Self::Virtual { amplitude, .. } => *amplitude,
+        }
+    }
+
+    /// Samples of the displacements a second, where these are recorded in the place of envelopes.
+    pub fn carrier_sample_hz(&self) -> Option<f64> {
+        match self {
+            Self::Rotation { carrier_sample_hz, .. } | Self::Decay { carrier_sample_hz, .. } => *carrier_sample_hz,
+            Self::Ringdown { .. } | Self::Virtual { .. } => None,
         }
     }
 }
