@@ -107,10 +107,10 @@ fn rotations_at_the_carrier_tell_the_mismatch() {
                     { id = \"detection-gain-mismatch\", detection_gain_ratio = 1.0132 },\n\
                     { id = \"anisodamping\", anisodamping = 4.7e-3, theta_tau = 27.0 },\n]\n"
         .to_owned();
-    for (rate, duration) in [(500, 4.0), (-500, 4.0), (120, 8.0)] {
+    for (rate, duration, kind) in [(500, 4.0, "parquet"), (-500, 4.0, "f32"), (120, 8.0, "f32")] {
         let _ = writeln!(
             text,
-            "[[run]]\nkind = \"rotation\"\nfile = \"rot{rate:+}.parquet\"\nrate_dps = {rate}.0\nduration_s = {duration:?}\n\
+            "[[run]]\nkind = \"rotation\"\nfile = \"rot{rate:+}.{kind}\"\nrate_dps = {rate}.0\nduration_s = {duration:?}\n\
              carrier_sample_hz = 50000.0"
         );
     }

@@ -22,6 +22,7 @@ mod memory;
 mod naming;
 mod open;
 mod parquet;
+mod raw;
 mod requirement;
 mod stamp;
 mod table;

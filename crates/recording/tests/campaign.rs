@@ -273,3 +273,77 @@ fn a_decay_needs_its_envelopes_or_the_carrier_and_keeps_the_rate_it_is_given() {
     let refused = Campaign::open(&folder.path().join("half.toml")).expect_err("no quadrature").to_string();
     assert!(refused.contains("a free decay needs"), "{refused}");
 }
+
+/// A decay of raw numbers beside a campaign that says what they are.
+fn raw(bytes: &[u8], says: &str) -> Result<Campaign, String> {
+    let folder = tempfile::tempdir().expect("a folder of the test's own");
+    std::fs::write(folder.path().join("scope.bin"), bytes).expect("it is written");
+    let text = headed(&format!("{says}\n"));
+    let path = folder.path().join("campaign.toml");
+    std::fs::write(&path, text).expect("it is written");
+    Campaign::open(&path).map_err(|e| e.to_string())
+}
+
+const RAW: &str = "[[run]]\nkind = \"decay\"\nfile = \"scope.bin\"\nraw = { columns = [\"x_v\", \"y_v\"], number = \"f32\", \
+                   sample_hz = 200000.0 }";
+
+#[test]
+fn raw_numbers_are_read_as_the_campaign_says() {
+    let values: [[f64; 2]; 3] = [[0.5, -1.25], [2.0, 3.0], [-0.75, 8.0]];
+    let bytes = |of: fn(f64) -> Vec<u8>| values.iter().flatten().flat_map(|v| of(*v)).collect::<Vec<u8>>();
+    #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
+    for (number, bytes, share) in [
+        ("f32", bytes(|v| (v as f32).to_le_bytes().to_vec()), 1.0),
+        ("f64", bytes(|v| v.to_le_bytes().to_vec()), 1.0),
+        ("i16", bytes(|v| ((4.0 * v) as i16).to_le_bytes().to_vec()), 4.0),
+        ("i32", bytes(|v| ((4.0 * v) as i32).to_le_bytes().to_vec()), 4.0),
+    ] {
+        let opened = raw(&bytes, &RAW.replace("f32", number)).expect("it is read");
+        let recording = &opened.runs[0].recording;
+        assert_eq!(recording.t_s, [0.0, 5e-6, 1e-5]);
+        let column = |at: usize| Some(values.iter().map(|row| share * row[at]).collect::<Vec<f64>>());
+        assert_eq!((&recording.x_v, &recording.y_v), (&column(0), &column(1)), "{number}");
+        assert!(recording.warnings.is_empty(), "{:?}", recording.warnings);
+    }
+}
+
+#[test]
+fn counts_become_volts_by_the_factor_of_the_mapping_and_other_columns_are_left_out() {
+    let bytes: Vec<u8> = [10_i16, 999, -20, 30, 999, 40].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let says = RAW.replace("[\"x_v\", \"y_v\"]", "[\"CH1\", \"trigger\", \"CH2\"]").replace("f32", "i16");
+    let opened =
+        raw(&bytes, &format!("{says}\n[columns]\nx_v = \"CH1*0.001\"\ny_v = \"CH2*0.002\"")).expect("it is read");
+    let recording = &opened.runs[0].recording;
+    assert_eq!(recording.x_v, Some(vec![10.0 * 0.001, 30.0 * 0.001]));
+    assert_eq!(recording.y_v, Some(vec![-20.0 * 0.002, 40.0 * 0.002]));
+    assert!(recording.warnings.iter().any(|w| w.contains("`trigger` is no channel")), "{:?}", recording.warnings);
+}
+
+#[test]
+fn a_raw_row_that_is_cut_off_or_holds_no_number_is_dropped_and_counted() {
+    let mut bytes: Vec<u8> = [1.0_f32, 2.0, f32::NAN, 3.0, 4.0, 5.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    bytes.extend([0; 5]);
+    let recording = raw(&bytes, RAW).expect("it is read").runs.remove(0).recording;
+    assert_eq!(recording.t_s, [0.0, 1e-5]);
+    assert_eq!(recording.dropped.truncated_last_line.count, 1);
+    assert_eq!(recording.dropped.rows_read, 4);
+}
+
+#[test]
+fn raw_numbers_that_are_not_said_fully_are_refused() {
+    for (from, to, wanted) in [
+        ("number = \"f32\", ", "", "`raw` has no `number`"),
+        ("sample_hz = 200000.0", "sample_hz = 0", "`sample_hz` is 0"),
+        (", sample_hz = 200000.0", "", "`raw` has no `sample_hz`"),
+        ("\"f32\"", "\"f16\"", "\"i16\" or \"i32\" or \"f32\" or \"f64\""),
+        ("[\"x_v\", \"y_v\"]", "[]", "`columns` is not a list of names"),
+        ("[\"x_v\", \"y_v\"]", "[\"x_v\", 3]", "`columns` is not a string"),
+        ("[\"x_v\", \"y_v\"]", "[\"x_v\", \"z\"]", "needs `t_s` and one of"),
+        ("sample_hz", "rate_hz", "the key `rate_hz` has no meaning in `raw`"),
+        ("scope.bin", "lost.bin", "the file `lost.bin` of this run is not there"),
+    ] {
+        let refused = raw(&[0; 64], &RAW.replace(from, to)).expect_err(wanted);
+        assert!(refused.contains(wanted), "{refused}\n  does not say: {wanted}");
+    }
+    assert!(raw(&[], RAW).is_err());
+}

@@ -1,5 +1,5 @@
-//! Simulated recordings in memory, and the folder they are written to: campaign.toml, one CSV or Parquet file per run,
-//! truth.toml.
+//! Simulated recordings in memory, and the folder they are written to: campaign.toml, a file for each run (CSV, Parquet or raw
+//! numbers, as its name ends), truth.toml.
 //!
 //! A row is one control sample as the electronics saw it: the readout with its noise and the commands computed from
 //! it, which are applied from that sample on. `rate_dps` is the commanded rate, `table_deg` the table's true angle.
@@ -7,6 +7,7 @@
 //! It refuses to touch files that are not its own: it creates the folder, overwrites its own names, deletes nothing.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -67,14 +68,32 @@ impl SimulatedRun {
     /// Writes the recording into the folder `dir`, as the name of its file says.
     fn write(&self, dir: &Path) -> Result<(), WriteError> {
         let path = dir.join(self.run.file());
-        let written =
-            if self.run.file().ends_with(".parquet") { self.parquet(&path) } else { fs::write(&path, self.csv()) };
+        let written = match Kind::of(&self.run) {
+            Kind::Parquet => self.parquet(&path),
+            Kind::Raw => self.raw(&path),
+            Kind::Csv => fs::write(&path, self.csv()),
+        };
         written.map_err(|source| WriteError { path, source })
     }
 
     fn parquet(&self, path: &Path) -> io::Result<()> {
         let columns: Vec<(&str, &[f64])> = self.columns.iter().map(|c| (c.name, c.values.as_slice())).collect();
         write_parquet_numbers(&columns, io::BufWriter::new(fs::File::create(path)?))
+    }
+
+    /// All columns but the time, row by row, as little-endian floating point of 32 bits.
+    fn raw(&self, path: &Path) -> io::Result<()> {
+        let mut file = io::BufWriter::new(fs::File::create(path)?);
+        let columns: Vec<&[f64]> =
+            self.columns.iter().filter(|c| c.name != "t_s").map(|c| c.values.as_slice()).collect();
+        for row in 0..columns.iter().map(|values| values.len()).min().unwrap_or(0) {
+            for values in &columns {
+                #[allow(clippy::cast_possible_truncation, reason = "what the file holds")]
+                let value = values.get(row).map_or(f32::NAN, |v| *v as f32);
+                file.write_all(&value.to_le_bytes())?;
+            }
+        }
+        file.flush()
     }
 
     /// The recording as CSV: nine significant digits of the column's largest value.
@@ -98,6 +117,40 @@ impl SimulatedRun {
             text.push('\n');
         }
         text
+    }
+}
+
+/// The format of a run's file, as its name says.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Csv,
+    Parquet,
+    Raw,
+}
+
+impl Kind {
+    fn of(run: &Run) -> Self {
+        match run.file().rsplit_once('.') {
+            Some((_, "parquet")) => Self::Parquet,
+            Some((_, "f32")) => Self::Raw,
+            _ => Self::Csv,
+        }
+    }
+}
+
+/// How the numbers of a raw file stand in it, for the campaign, which alone says so.
+#[derive(Serialize)]
+struct Raw {
+    columns: Vec<&'static str>,
+    number: &'static str,
+    sample_hz: f64,
+}
+
+impl Raw {
+    fn of(run: &Run) -> Option<Self> {
+        let sample_hz = run.carrier_sample_hz().filter(|_| Kind::of(run) == Kind::Raw)?;
+        let columns = displacement::names(run).into_iter().filter(|name| *name != "t_s").collect();
+        Some(Self { columns, number: "f32", sample_hz })
     }
 }
 
@@ -277,6 +330,8 @@ enum CampaignRun<'a> {
         amplitude: f64,
         #[serde(skip_serializing_if = "Option::is_none")]
         rate_dps: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        raw: Option<Raw>,
     },
     Decay {
         file: &'a str,
@@ -285,6 +340,8 @@ enum CampaignRun<'a> {
         amplitude: f64,
         #[serde(skip_serializing_if = "Option::is_none")]
         rate_dps: Option<f64>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        raw: Option<Raw>,
     },
     Ringdown {
         file: &'a str,
@@ -306,13 +363,15 @@ impl<'a> CampaignRun<'a> {
                 // a column where it changes, and beside envelopes
                 let constant = carrier_sample_hz.is_some() && *profile == Profile::Constant;
                 let rate_dps = constant.then_some(*rate_dps);
-                Self::Rotation { file, settle_s: *settle_s, purpose: *purpose, amplitude: *amplitude, rate_dps }
+                let raw = Raw::of(run);
+                Self::Rotation { file, settle_s: *settle_s, purpose: *purpose, amplitude: *amplitude, rate_dps, raw }
             }
             Run::Decay { file, purpose, amplitude, rate_dps, carrier_sample_hz, .. } => Self::Decay {
                 file,
                 purpose: *purpose,
                 amplitude: *amplitude,
                 rate_dps: carrier_sample_hz.map(|_| *rate_dps),
+                raw: Raw::of(run),
             },
             Run::Ringdown { file, angle_deg, energy_off_s, .. } => {
                 Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s }

@@ -305,6 +305,27 @@ fn what_is_written_run_by_run_is_what_is_written_at_once() {
 }
 
 #[test]
+fn raw_numbers_are_said_by_the_campaign() {
+    let scenario = Scenario::parse(&DECAY.replace("carrier.parquet", "carrier.f32")).expect("valid");
+    let dir = tempfile::tempdir().expect("a folder");
+    scenario.write(dir.path()).expect("written");
+    let campaign: toml::Table =
+        std::fs::read_to_string(dir.path().join("campaign.toml")).expect("there").parse().expect("TOML");
+    let raw = &campaign["run"][1]["raw"];
+    assert_eq!(raw["columns"].as_array().map(Vec::len), Some(2));
+    assert_eq!((raw["number"].as_str(), raw["sample_hz"].as_float()), (Some("f32"), Some(100_000.0)));
+    assert!(campaign["run"][0].get("raw").is_none());
+    let bytes = std::fs::read(dir.path().join("carrier.f32")).expect("there");
+    let simulated = scenario.simulate();
+    let run = by_file(&simulated.runs, "carrier.f32");
+    assert_eq!(bytes.len(), 2000 * 2 * 4);
+    for (row, pair) in bytes.chunks_exact(8).enumerate() {
+        let [x, y] = [&pair[..4], &pair[4..]].map(|b| f32::from_le_bytes(b.try_into().expect("four")));
+        assert_eq!([x, y], [column(run, "x_v")[row] as f32, column(run, "y_v")[row] as f32]);
+    }
+}
+
+#[test]
 fn the_truth_has_the_spring() {
     let text = DECAY.replace("carrier_hz", "spring_isotropic = { c = 0.01 }\ncarrier_hz");
     let truth: toml::Table = Scenario::parse(&text).expect("valid").simulate().truth_toml().parse().expect("TOML");
@@ -335,6 +356,7 @@ fn what_is_not_built_at_the_carrier_is_refused() {
         ("angular_gain = 0.78", "angular_gain = 0.78\nspring_isotropic = { c = nan }", "spring_isotropic.c: NaN"),
         ("angular_gain = 0.78", "angular_gain = 1.0\ninstrument = \"sensor\"", "a sensor has nothing that rings"),
         ("carrier.parquet", "carrier.hdf5", "ends in .csv or .parquet"),
+        ("envelope.csv", "envelope.f32", "or at the carrier in .f32"),
     ] {
         let error = refusal(&DECAY.replace(from, to));
         assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");

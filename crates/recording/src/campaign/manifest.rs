@@ -12,6 +12,7 @@ use super::{Instrument, Reference, Role, RunKind};
 use crate::Recording;
 use crate::error::ReadError;
 use crate::naming::Naming;
+use crate::raw::{Number, Raw};
 
 /// A place in the campaign file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub(super) struct Entry {
     pub(super) file: PathBuf,
     /// Where the file is named.
     pub(super) at: Position,
+    /// How the numbers of a file stand in it that does not say so itself.
+    pub(super) raw: Option<Raw>,
     pub(super) settle_s: f64,
     pub(super) role: Role,
     pub(super) amplitude: Option<f64>,
@@ -103,11 +106,11 @@ const CAMPAIGN_KEYS: &[&str] = &[
     "drive_per_s_v",
     "control_hz",
 ];
-const ROTATION_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
-const STATIC_KEYS: &[&str] = &["kind", "file", "settle_s"];
-const DECAY_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude", "rate_dps"];
-const VIRTUAL_KEYS: &[&str] = &["kind", "file", "settle_s", "use", "amplitude"];
-const RINGDOWN_KEYS: &[&str] = &["kind", "file", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
+const ROTATION_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude", "rate_dps"];
+const STATIC_KEYS: &[&str] = &["kind", "file", "raw", "settle_s"];
+const DECAY_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude", "rate_dps"];
+const VIRTUAL_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude"];
+const RINGDOWN_KEYS: &[&str] = &["kind", "file", "raw", "angle_deg", "energy_off_s", "settle_s", "use", "amplitude"];
 
 /// No temperature is below, °C.
 const ABSOLUTE_ZERO_C: f64 = -273.15;
@@ -313,10 +316,35 @@ impl Text<'_> {
             kind,
             file: PathBuf::from(name),
             at: self.position(&file.span()),
+            raw: get(table, "raw").map(|value| self.raw(value)).transpose()?,
             settle_s: self.number(table, "settle_s", "0 or more seconds", |value| value >= 0.0)?.unwrap_or(0.0),
             role: self.choice(table, "use", &[("fit", Role::Fit), ("holdout", Role::Holdout)])?.unwrap_or_default(),
             amplitude: self.number(table, "amplitude", "a positive relative amplitude", |value| value > 0.0)?,
             rate_dps: self.number(table, "rate_dps", "a constant rate in deg/s", |_| true)?,
+        })
+    }
+
+    /// `raw`: how the numbers of a run's file stand in it.
+    fn raw(&self, value: &Value<'_>) -> Result<Raw, ReadError> {
+        const WANTED: &str = "as in `raw = { columns = [\"x_v\", \"y_v\"], number = \"f32\", sample_hz = 200000.0 }`";
+        let Some(table) = value.get_ref().as_table() else {
+            return Err(self.refuse(value.span(), "`raw` is not a table", WANTED));
+        };
+        self.refuse_unknown(table, &["columns", "number", "sample_hz"], "in `raw`")?;
+        let missing = |key: &str| self.refuse(value.span(), format!("`raw` has no `{key}`"), WANTED);
+        let columns = get(table, "columns").ok_or_else(|| missing("columns"))?;
+        let Some(list) = columns.get_ref().as_array().filter(|list| !list.is_empty()) else {
+            return Err(self.refuse(columns.span(), "`columns` is not a list of names", WANTED));
+        };
+        Ok(Raw {
+            columns: list
+                .iter()
+                .map(|name| self.string(name, "columns").map(str::to_owned))
+                .collect::<Result<_, _>>()?,
+            number: self.choice(table, "number", &Number::NAMES)?.ok_or_else(|| missing("number"))?,
+            sample_hz: self
+                .number(table, "sample_hz", "a positive number of rows a second", |value| value > 0.0)?
+                .ok_or_else(|| missing("sample_hz"))?,
         })
     }
 

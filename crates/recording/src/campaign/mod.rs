@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 use super::Recording;
 use super::error::ReadError;
 use super::naming::Naming;
-use manifest::{Manifest, Position};
+use super::raw;
+use manifest::{Entry, Manifest, Position};
 
 /// What kind of instrument was recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -242,7 +243,11 @@ impl Campaign {
     }
 
     fn open_manifest(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
-        Self::assembled(Self::manifest(path)?, path, naming, instrument, Recording::read_named)
+        let read = |entry: &Entry, file: &Path, naming: &Naming| match &entry.raw {
+            Some(raw) => raw::read(file, raw, naming),
+            None => Recording::read_named(file, naming),
+        };
+        Self::assembled(Self::manifest(path)?, path, naming, instrument, read)
     }
 
     /// The campaign of a campaign file's text, its recordings given by `read`, which is asked for each by the path that the
@@ -255,8 +260,10 @@ impl Campaign {
         path: &Path,
         naming: &Naming,
         instrument: Option<Instrument>,
-        read: impl FnMut(&Path, &Naming) -> Result<Recording, ReadError>,
+        mut read: impl FnMut(&Path, &Naming) -> Result<Recording, ReadError>,
     ) -> Result<Self, ReadError> {
+        // what is given is no file that could be raw
+        let read = |_: &Entry, file: &Path, naming: &Naming| read(file, naming);
         Self::assembled(manifest::parse(text.as_bytes(), path)?, path, naming, instrument, read)
     }
 
@@ -265,7 +272,7 @@ impl Campaign {
         path: &Path,
         naming: &Naming,
         instrument: Option<Instrument>,
-        mut read: impl FnMut(&Path, &Naming) -> Result<Recording, ReadError>,
+        mut read: impl FnMut(&Entry, &Path, &Naming) -> Result<Recording, ReadError>,
     ) -> Result<Self, ReadError> {
         let instrument = instrument.unwrap_or(manifest.instrument);
         let naming = &naming.over(&manifest.naming);
@@ -274,7 +281,8 @@ impl Campaign {
         let mut warnings = manifest.warnings.clone();
         for entry in &manifest.runs {
             let file = folder.join(&entry.file);
-            let mut recording = read(&file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
+            let mut recording =
+                read(entry, &file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
             warnings.extend(entry.constant_rate(&mut recording));
             match entry.kind {
                 RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,

@@ -42,6 +42,15 @@ pub(crate) fn begin(
     }
 }
 
+/// Names of the columns of a run.
+pub(crate) fn names(run: &Run) -> Vec<&'static str> {
+    match run {
+        Run::Rotation { profile: Profile::ThereAndBack, .. } => vec!["t_s", "rate_dps", "x_v", "y_v", "vas_v", "vqc_v"],
+        Run::Rotation { .. } => vec!["t_s", "x_v", "y_v", "vas_v", "vqc_v"],
+        _ => vec!["t_s", "x_v", "y_v"],
+    }
+}
+
 /// The columns of the run at `index`; none where it cannot be begun, which no scenario that exists has.
 pub(crate) fn record(scenario: &Scenario, index: usize, run: &Run, sample_hz: f64) -> Vec<Column> {
     let Ok(mut closed) = begin(scenario, index, run, sample_hz) else { return Vec::new() };
@@ -50,38 +59,39 @@ pub(crate) fn record(scenario: &Scenario, index: usize, run: &Run, sample_hz: f6
         Run::Rotation { rate_dps, profile: Profile::ThereAndBack, .. } => (*rate_dps, Some(count / 2)),
         _ => (0.0, None),
     };
-    let is_driven = matches!(run, Run::Rotation { .. });
     let spring = spring(scenario.settings());
-    let (mut t_s, mut x, mut y, mut rates) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut commands = [Vec::new(), Vec::new()];
+    let names = names(run);
+    let mut columns: Vec<Column> = names.iter().map(|&name| Column { name, values: Vec::new() }).collect();
     for k in 0..count {
-        let is_back = back_at.is_some_and(|at| k >= at);
         if back_at == Some(k) {
             closed.plant.set_rate(-rate_dps.to_radians());
         }
         let mut volts = [0.0; 2];
-        if is_driven {
+        if matches!(run, Run::Rotation { .. }) {
             closed.step_through(|v| {
                 volts = v;
                 v
             });
-            commands[0].push(closed.state.seen.v_as);
-            commands[1].push(closed.state.seen.v_qc);
         } else {
             volts = closed.step_without_electronics();
         }
         if let Some(spring) = &spring {
             closed.plant.bend(spring);
         }
-        #[allow(clippy::cast_precision_loss, reason = "2^53 samples are not reached")]
-        t_s.push(k as f64 / sample_hz);
-        x.push(volts[0]);
-        y.push(volts[1]);
-        if back_at.is_some() {
-            rates.push(if is_back { -rate_dps } else { rate_dps });
+        let seen = &closed.state.seen;
+        for column in &mut columns {
+            #[allow(clippy::cast_precision_loss, reason = "2^53 samples are not reached")]
+            let value = match column.name {
+                "t_s" => k as f64 / sample_hz,
+                "rate_dps" if back_at.is_some_and(|at| k >= at) => -rate_dps,
+                "rate_dps" => rate_dps,
+                "x_v" => volts[0],
+                "y_v" => volts[1],
+                "vas_v" => seen.v_as,
+                _ => seen.v_qc,
+            };
+            column.values.push(value);
         }
     }
-    let [v_as, v_qc] = commands;
-    let columns = [("t_s", t_s), ("rate_dps", rates), ("x_v", x), ("y_v", y), ("vas_v", v_as), ("vqc_v", v_qc)];
-    columns.into_iter().filter(|(_, v)| !v.is_empty()).map(|(name, values)| Column { name, values }).collect()
+    columns
 }

@@ -122,7 +122,8 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
     for (index, run) in s.runs.iter().enumerate() {
         let file = run.file();
         let field = |key: &str| format!("run {file:?}: {key}");
-        file_name(file).map_err(|e| ScenarioError::invalid(format!("run {}: file", index + 1), e))?;
+        file_name(file, run.carrier_sample_hz().is_some())
+            .map_err(|e| ScenarioError::invalid(format!("run {}: file", index + 1), e))?;
         if s.runs.iter().take(index).any(|r| r.file().eq_ignore_ascii_case(file)) {
             return Err(ScenarioError::invalid(field("file"), "another run has the same file"));
         }
@@ -186,12 +187,14 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
 }
 
 /// A plain name in the campaign's own folder.
-fn file_name(name: &str) -> Result<(), String> {
+fn file_name(name: &str, is_at_carrier: bool) -> Result<(), String> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "+-_.".contains(c));
     let ends = [".csv", ".parquet"].iter().any(|end| name.ends_with(end));
-    if name.is_empty() || !plain || name.starts_with('.') || !ends {
+    // raw numbers have no time, which those of the converters do not need
+    let is_raw = is_at_carrier && name.ends_with(".f32");
+    if name.is_empty() || !plain || name.starts_with('.') || !(ends || is_raw) {
         return Err(format!(
-            "{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv or .parquet"
+            "{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv or .parquet, or at the carrier in .f32"
         ));
     }
     Ok(())
