@@ -361,6 +361,8 @@ fn what_is_not_built_at_the_carrier_is_refused() {
         let error = refusal(&DECAY.replace(from, to));
         assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");
     }
+    let fast = minimal("carrier_hz = 15200.0", "carrier_sample_hz = 3000000.0");
+    assert!(refusal(&fast).contains("carrier_sample_hz: 3000000 is more than the 2000000 of the fastest electronics"));
     let rotation = |keys: &str, run: &str| refusal(&minimal(&format!("carrier_hz = 15200.0\n{keys}"), run));
     let at_carrier = "carrier_sample_hz = 50000.0";
     for (keys, run, wanted) in [

@@ -3,6 +3,9 @@
 use super::{Reference, Run, Scenario, ScenarioError};
 use crate::carrier::displacement;
 
+/// The most samples a second at which electronics are started, 1/s.
+const FASTEST_ELECTRONICS_HZ: f64 = 2e6;
+
 /// Refuses what a device at the carrier does not have, and runs that do not start.
 pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
     let s = scenario.settings();
@@ -28,6 +31,12 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
             ));
         }
         if let Run::Rotation { start_deg, reference, .. } = run {
+            if sample_hz > FASTEST_ELECTRONICS_HZ {
+                return Err(ScenarioError::invalid(
+                    field("carrier_sample_hz"),
+                    format!("{sample_hz} is more than the {FASTEST_ELECTRONICS_HZ} of the fastest electronics"),
+                ));
+            }
             if start_deg.is_some() {
                 return Err(ScenarioError::invalid(
                     field("start_deg"),
