@@ -372,6 +372,44 @@ fn the_bias_of_a_rate_gyroscope_that_hardly_turns_is_told_all_the_same() {
     assert!(held_out(&i) < 0.25 * i.report.heldout.raw.unwrap().rms_deg, "{:?}", i.report.heldout);
 }
 
+/// A rate gyroscope of a scale factor of 0.98 and this bias, whose table turns at these rates one after the other, 10 s each.
+fn turned_at(file: &str, rates_dps: &[f64], bias_dps: f64, seed: u64) -> Run {
+    let mut noise = Noise::new(seed);
+    let (mut t_s, mut table, mut theta) = (vec![0.0], vec![0.0], vec![0.0]);
+    for i in 1..1000 * rates_dps.len() {
+        let rate = rates_dps[(i - 1) / 1000];
+        t_s.push(0.01 * i as f64);
+        table.push(table[i - 1] + 0.01 * rate);
+        theta.push(theta[i - 1] + 0.01 * (0.98 * rate + bias_dps + 0.02 * noise.sample()));
+    }
+    run(file, Role::Fit, Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() })
+}
+
+/// Nothing is stated of how it counts, as in a first campaign.
+fn turned(runs: Vec<Run>) -> Result<Identification, cvg_calibration::Refusal> {
+    let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
+    identify(campaign, &Options::default())
+}
+
+#[test]
+fn runs_at_constant_rates_beside_one_that_turns_back_tell_bias_and_scale_factor() {
+    // the last quarter of a run is held out: it turns back as well
+    let there_and_back = [90.0, -90.0, 90.0, -90.0, 90.0, -90.0];
+    let runs = [("a.csv", &there_and_back[..]), ("b.csv", &[-60.0; 4]), ("c.csv", &[120.0; 4])];
+    let of = |biases: [f64; 3]| {
+        let made = runs.iter().zip(biases).enumerate();
+        turned(made.map(|(i, ((file, rates), bias))| turned_at(file, rates, bias, i as u64)).collect()).unwrap()
+    };
+    let i = of([0.35; 3]);
+    assert!((i.report.angular_gain.value + 0.98).abs() < 1e-4, "{:?}", i.report.angular_gain);
+    let bias = find(&i, "rate-offset").unwrap_or_else(|| panic!("{:#?}", i.report));
+    assert!((bias.parameters[0].value.to_degrees() - 0.35).abs() < 0.01, "{bias:?}");
+    assert_eq!(i.report.warnings, Vec::<String>::new());
+    // a bias that does not repeat leaves the scale factor to the run that turns back
+    let k = of([0.35, -0.3, 0.05]).report.angular_gain;
+    assert!(k.ci95[0] < -0.98 && -0.98 < k.ci95[1] && k.half_width() < 0.02, "{k:?}");
+}
+
 #[test]
 fn a_rate_gyroscope_in_radians_is_refused_and_the_unit_is_named() {
     let as_read = |theta: fn(f64) -> f64, table: fn(f64) -> f64| {
@@ -510,4 +548,41 @@ fn measured_devices_are_no_worse_than_a_short_script() {
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Ten turns of a sensor of these readout errors, read at 100 samples/s.
+fn ten_turns(ratio: f64, offset_v: f64) -> Recording {
+    let t_s: Vec<f64> = (0..2000).map(|i| 0.01 * f64::from(i)).collect();
+    let table: Vec<f64> = t_s.iter().map(|t| 180.0 * t).collect();
+    let mut noise = Noise::new(17);
+    let (x, y) = table
+        .iter()
+        .map(|d| {
+            let (sin, cos) = d.to_radians().sin_cos();
+            (offset_v + cos + 1e-4 * noise.sample(), ratio * sin + 1e-4 * noise.sample())
+        })
+        .unzip();
+    Recording { t_s, table_deg: Some(table), xc_v: Some(x), yc_v: Some(y), ..Recording::default() }
+}
+
+#[test]
+fn a_recording_of_another_sensor_or_with_exchanged_channels_is_not_compensated() {
+    let calibration = identified(sensor(vec![run("turns.csv", Role::Fit, ten_turns(1.08, 0.1))])).calibration;
+    let without_reference = |r: Recording| Recording { table_deg: None, ..r };
+    let exchanged = |r: Recording| Recording { xc_v: r.yc_v.clone(), yc_v: r.xc_v.clone(), ..r };
+    let turned =
+        |by: f64, r: Recording| Recording { table_deg: r.table_deg.map(|v| v.iter().map(|d| by * d).collect()), ..r };
+    let sound = || ten_turns(1.08, 0.1);
+    for served in [sound(), without_reference(sound()), turned(-1.0, sound())] {
+        assert!(compensate(&calibration, &served).is_ok());
+    }
+    let refused = |r: Recording| compensate(&calibration, &r).map(|r| r.len()).unwrap_err().to_string();
+    for other in [ten_turns(0.95, -0.1), exchanged(sound())] {
+        assert!(refused(other.clone()).contains("its angle is off by"), "{}", refused(other));
+        assert!(refused(without_reference(other)).contains("its radius is off by"));
+    }
+    // in radians, and another number of poles
+    for by in [1f64.to_radians(), 0.25] {
+        assert!(refused(turned(by, sound())).contains("times as far as its reference"));
+    }
 }

@@ -51,6 +51,18 @@ fn a_gain_that_follows_the_temperature_is_found_with_its_slope() {
     assert!(count(|o| o.1) <= few && count(|o| o.3) <= few, "intervals miss");
 }
 
+/// A wrong unit, or a chamber that was never there: what is stated is not what was recorded.
+#[test]
+fn parameters_stated_far_from_what_was_recorded_are_said_to_be_extrapolated() {
+    let said = |reference_c: f64| {
+        let (mut settings, _) = device(0, true);
+        settings.temperature = settings.temperature.map(|t| Temperature { reference_c, ..t });
+        let warnings = identify(settings).unwrap().report.warnings;
+        warnings.iter().any(|w| w.contains("it is extrapolated by"))
+    };
+    assert_eq!([25.0, -20.0, 77.0].map(said), [false, true, true]);
+}
+
 #[test]
 fn a_temperature_that_nothing_follows_is_no_cause() {
     let claimed = all(trials(4), |seed| {

@@ -234,6 +234,9 @@ impl Errors {
     }
 }
 
+/// A temperature that lies so far from those that were recorded is another one, K.
+const EXTRAPOLATED_K: f64 = 10.0;
+
 /// An identified campaign, before it is told.
 struct Found {
     dataset: Dataset,
@@ -275,6 +278,7 @@ impl Found {
             fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
         };
         let mut runs = self.runs(head.runs, &mut warnings);
+        warnings.extend(self.extrapolated());
         let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some().then_some(&own_ratios));
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
@@ -333,6 +337,24 @@ impl Found {
             on_fit: &self.errors.on_fit,
             members,
         }
+    }
+
+    /// Parameters that follow the temperature and are stated at one that was not recorded, nor nearly.
+    fn extrapolated(&self) -> Option<String> {
+        let h = &self.fitted.fit.hypothesis;
+        let reference_c = h.reference_c.filter(|_| h.members.iter().any(|m| m.id.by_temperature()))?;
+        let of = |pick: fn(f64, f64) -> f64, from: f64| {
+            self.dataset.tracks.iter().flat_map(|t| t.track.temperatures_c()).fold(from, pick)
+        };
+        let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
+        let beyond = (low - reference_c).max(reference_c - high);
+        (beyond > EXTRAPOLATED_K).then(|| {
+            format!(
+                "what follows the temperature is stated at {reference_c:.1} °C (temperature_c) and was recorded between \
+                 {low:.1} and {high:.1} °C: it is extrapolated by {beyond:.0} K, beyond its interval; temp_c in °C, or \
+                 temperature_c where it was recorded"
+            )
+        })
     }
 
     /// How what the runs tell goes with their temperatures.

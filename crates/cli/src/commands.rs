@@ -253,7 +253,11 @@ pub(crate) fn summary(identified: &Identification) -> String {
     };
     if r.instrument == Instrument::Sensor.name() {
         let k = r.angular_gain.value;
-        let told = if k == k.trunc() { pole_pairs(k) } else { estimate(&Some(r.angular_gain)) };
+        let told = if k == k.trunc() {
+            pole_pairs(k, identified.calibration.hypothesis.sense())
+        } else {
+            estimate(&Some(r.angular_gain))
+        };
         line(format!("  periods a turn              {told}"));
         line(format!("  gain of Y over X            {}", estimate(&r.detection_gain_ratio)));
     } else {
@@ -283,9 +287,10 @@ pub(crate) fn summary(identified: &Identification) -> String {
     s
 }
 
-/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn.
-fn pole_pairs(k: f64) -> String {
-    let sense = if k < 0.0 { "with the reference" } else { "reversed: against the reference" };
+/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn; k has
+/// the sign that the campaign states, and `sense` is what was seen: −1 as in Equation 1.
+fn pole_pairs(k: f64, sense: f64) -> String {
+    let sense = if sense * k > 0.0 { "with the reference" } else { "reversed: against the reference" };
     let pairs = if k.abs() == 1.0 { "1 period a turn".to_owned() } else { format!("{} pole pairs", k.abs()) };
     format!("{k}: {pairs}, counting {sense}")
 }

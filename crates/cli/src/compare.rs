@@ -43,7 +43,21 @@ const ESTIMATES: [(&str, &str); 7] = [
 
 /// Compares two answers.
 pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
-    let pairs = paired(parameters(a)?, parameters(b)?);
+    let [of_a, of_b] = [answer(a)?, answer(b)?];
+    if of_a.instrument != of_b.instrument {
+        return Err(Failure::input(format!(
+            "{} is of a {}, {} of a {}: their parameters are not the same quantities; wanted two answers about one kind of \
+             instrument",
+            a.display(),
+            of_a.instrument,
+            b.display(),
+            of_b.instrument
+        )));
+    }
+    if of_a.device != of_b.device {
+        output::tell(format_args!("A is of {}, B of {}", of_a.device, of_b.device));
+    }
+    let pairs = paired(of_a.parameters, of_b.parameters);
     if json {
         let list: Vec<Value> = pairs.iter().map(Pair::as_value).collect();
         let moved = pairs.iter().filter(|p| p.moved() == Some(true)).count();
@@ -55,15 +69,27 @@ pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
     output::answer(&in_words(&pairs))
 }
 
+/// What is compared: the parameters of an instrument.
+struct Answer {
+    device: String,
+    instrument: String,
+    parameters: Vec<Parameter>,
+}
+
 /// The parameters of a report, of the report in a folder, or of a calibration.
-fn parameters(path: &Path) -> Result<Vec<Parameter>, Failure> {
+fn answer(path: &Path) -> Result<Answer, Failure> {
     let bad = |what: String| {
         let wanted = "report.json, a folder with one, or calibration.toml, as cvg identify writes them";
         Failure::input(format!("{}: {what}; wanted {wanted}", path.display()))
     };
     let file = if path.is_dir() { path.join("report.json") } else { path.to_owned() };
     if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        return Ok(of_calibration(&Calibration::read(&file)?));
+        let calibration = Calibration::read(&file)?;
+        return Ok(Answer {
+            instrument: calibration.hypothesis.instrument.name().to_owned(),
+            parameters: of_calibration(&calibration),
+            device: calibration.device,
+        });
     }
     let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
     let report: Value = serde_json::from_str(&text).map_err(|e| bad(format!("is no report: {e}")))?;
@@ -73,7 +99,8 @@ fn parameters(path: &Path) -> Result<Vec<Parameter>, Failure> {
     if report["status"] == "refused" {
         return Err(bad("has no answer (refused)".into()));
     }
-    Ok(of_report(&report))
+    let text = |key: &str| report[key].as_str().unwrap_or_default().to_owned();
+    Ok(Answer { device: text("device"), instrument: text("instrument"), parameters: of_report(&report) })
 }
 
 /// The parameters of a report.
@@ -195,6 +222,9 @@ fn in_words(pairs: &[Pair]) -> String {
     }
     let moved: Vec<&str> = pairs.iter().filter(|p| p.moved() == Some(true)).map(|p| p.name.as_str()).collect();
     let _ = match moved.as_slice() {
+        [] if pairs.iter().all(|p| p.moved().is_none()) => {
+            writeln!(s, "nothing is told by both with an interval: whether something moved is not told")
+        }
         [] => writeln!(s, "nothing moved beyond the combined 95 % intervals"),
         names => writeln!(s, "moved beyond the combined 95 % intervals: {}", names.join(", ")),
     };

@@ -125,6 +125,26 @@ fn what_is_no_answer_cannot_be_compared() {
     }
 }
 
+/// Their parameters bear the same names and are other quantities.
+#[test]
+fn a_gyroscope_and_a_sensor_are_not_compared_and_another_device_is_named() {
+    let bench = Bench::small();
+    let before = identified(&bench).join("report.json");
+    let changed = |key: &str, value: &str| {
+        let mut other: Value = serde_json::from_slice(&fs::read(&before).unwrap()).unwrap();
+        other[key] = value.into();
+        let path = bench.path(&format!("{key}.json"));
+        fs::write(&path, other.to_string()).unwrap();
+        run(&[&"compare", &before, &path])
+    };
+    let kinds = changed("instrument", "sensor");
+    assert_eq!(kinds.status, 2, "{}", kinds.stdout);
+    assert!(kinds.stderr.contains("of a gyroscope") && kinds.stderr.contains("of a sensor"), "{}", kinds.stderr);
+    let devices = changed("device", "another");
+    assert_eq!(devices.status, 0, "{}", devices.stderr);
+    assert!(devices.stderr.contains("B of another"), "{}", devices.stderr);
+}
+
 // At rest
 
 /// Normal noise of variance 1 from a counter (Box–Muller).
@@ -225,6 +245,35 @@ fn runs_at_rest_stand_beside_rotations() {
     assert_eq!(found["angular_gain"], wanted["angular_gain"]);
     assert!(found["allan"]["points"].as_array().unwrap().len() > 10 && wanted["allan"].is_null());
     assert!(found["inputs"].to_string().contains("rest.csv"));
+}
+
+/// Somebody walks by, or the table is turned: what then moves is no noise of the instrument.
+#[test]
+fn motion_at_rest_is_left_out_and_named_and_a_run_that_moves_is_no_answer() {
+    let folder = TempDir::new().unwrap();
+    let moved = |by: &dyn Fn(usize) -> f64| {
+        let text = at_rest(20_000, 1, false);
+        let mut lines = text.lines();
+        let mut out = format!("{}\n", lines.next().unwrap());
+        for (i, line) in lines.enumerate() {
+            let (t, theta) = line.split_once(',').unwrap();
+            let _ = writeln!(out, "{t},{}", (theta.parse::<f64>().unwrap() + by(i)).rem_euclid(180.0));
+        }
+        static_campaign(folder.path(), &[("rest.csv", out)])
+    };
+    let walk = |r: &Value| estimate(&r["allan"]["angle_random_walk_deg_sqrt_h"]);
+    let still = report(&moved(&|_| 0.0));
+    assert!(!still["warnings"].to_string().contains("moves"), "{}", still["warnings"]);
+    // three degrees to and fro in two seconds, and a turn to another angle
+    let bump = |i: usize| 3.0 * f64::from(u8::from((5000..5020).contains(&i))) + 20.0 * f64::from(u8::from(i > 9000));
+    let bumped = report(&moved(&bump));
+    let [[a, low, high], [b, ..]] = [walk(&still), walk(&bumped)];
+    assert!(low < b && b < high, "{b} of {a}");
+    let said = bumped["warnings"].to_string();
+    assert!(said.contains("rest.csv: the instrument moves") && said.contains("first 499."), "{said}");
+    let walking = run(&[&"identify", &moved(&|i| 5.0 * f64::from(u8::from(i % 40 < 4)))]);
+    assert_eq!(walking.status, 1, "{}", walking.stdout);
+    assert!(walking.stderr.contains("rest.csv") && walking.stderr.contains("moves"), "{}", walking.stderr);
 }
 
 #[test]

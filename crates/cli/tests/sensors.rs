@@ -162,6 +162,21 @@ fn a_reference_that_is_not_to_be_used_is_not_used() {
     assert!(told("")["angular_gain"]["value"].is_number());
 }
 
+/// By Equation 1 k = −1 counts with the turn. A campaign that states 1 keeps its sign, and the sense is said as it was seen.
+#[test]
+fn the_sense_is_said_as_it_was_seen_whatever_sign_is_stated() {
+    let folder = TempDir::new().unwrap();
+    written(&folder, "hall.csv", &turned_by_hand(1.0, 0.0, f64::INFINITY, true));
+    for gain in ["1.0", "-1.0"] {
+        let head = format!("[campaign]\ndevice = \"hall\"\ninstrument = \"sensor\"\nangular_gain = {gain}\n");
+        let text = format!("{head}[[run]]\nkind = \"rotation\"\nfile = \"hall.csv\"\n");
+        let campaign = written(&folder, "campaign.toml", &text);
+        let said = cvg(&[OsStr::new("identify"), campaign.as_ref()]);
+        let line = said.stdout.lines().find(|l| l.contains("periods a turn")).unwrap_or_default().to_owned();
+        assert!(line.ends_with("1 period a turn, counting with the reference"), "{gain}: {line} {}", said.stderr);
+    }
+}
+
 #[test]
 fn a_sensor_given_as_a_gyroscope_is_told_what_it_looks_like() {
     let folder = TempDir::new().unwrap();

@@ -101,6 +101,12 @@ fn convert(
             column.values.iter_mut().for_each(|value| *value = by.of(*value));
             continue;
         }
+        let temperature = (channel == Channel::Temperature && !is_stated).then(|| units::absolute(&column.values));
+        if let Some((unit, by)) = temperature.flatten() {
+            warnings.push(format!("`{channel}` is above 230 throughout: it is taken for {unit}, and to °C"));
+            column.values.iter_mut().for_each(|value| *value = by.of(*value));
+            continue;
+        }
         if by == Conversion::NONE {
             continue;
         }

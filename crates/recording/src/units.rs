@@ -41,6 +41,18 @@ pub(crate) fn since_1970(time: f64) -> Option<(&'static str, Conversion)> {
     Some((unit, Conversion::by(factor)))
 }
 
+/// Electronics work between −60 and 225 °C; as K these are 213 to 498.
+const WARMEST_C: f64 = 230.0;
+const WARMEST_K: f64 = 500.0;
+
+/// The unit of temperatures that state none and are all too high for °C.
+pub(crate) fn absolute(temperatures: &[f64]) -> Option<(&'static str, Conversion)> {
+    let mut finite = temperatures.iter().filter(|t| t.is_finite()).peekable();
+    finite.peek()?;
+    let is_absolute = finite.all(|t| (WARMEST_C..=WARMEST_K).contains(t));
+    is_absolute.then_some(("K", Conversion { factor: 1.0, offset: -ICE_K }))
+}
+
 /// The conversion of a unit to a channel's; `None` where it is not known to be one of this kind.
 pub(crate) fn conversion(channel: Channel, unit: &str) -> Option<Conversion> {
     let unit = plain(unit);
@@ -51,6 +63,7 @@ pub(crate) fn conversion(channel: Channel, unit: &str) -> Option<Conversion> {
         Channel::Temperature => match unit.as_str() {
             "°c" | "c" | "degc" | "celsius" => Some(Conversion::NONE),
             "k" | "kelvin" => Some(Conversion { factor: 1.0, offset: -ICE_K }),
+            "°f" | "f" | "degf" | "fahrenheit" => Some(Conversion { factor: 5.0 / 9.0, offset: -32.0 * 5.0 / 9.0 }),
             _ => None,
         },
         // displacements are in any unit

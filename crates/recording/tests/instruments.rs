@@ -64,6 +64,25 @@ fn a_row_of_units_is_a_conversion_that_is_said() {
 }
 
 #[test]
+fn temperatures_in_kelvin_or_fahrenheit_become_celsius() {
+    let of = |head: &str, rows: &str| {
+        let recording = read(&format!("{head}{rows}"), &[]).unwrap();
+        (recording.temp_c.unwrap(), recording.warnings)
+    };
+    let (head, in_f) = ("t_s,rate_dps,xc_v,yc_v,temp_c\n", "0,1,1,0,77\n1,1,0,1,68\n");
+    let near = |found: &[f64], wanted: [f64; 2]| found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-9);
+    let (stated, said) = of(&format!("{head}s,deg/s,V,V,°F\n"), in_f);
+    assert!(near(&stated, [25.0, 20.0]) && said.len() == 1, "{stated:?} {said:?}");
+    // no electronics work at 298 °C
+    let (absolute, said) = of(head, "0,1,1,0,298.15\n1,1,0,1,293.15\n");
+    assert!(near(&absolute, [25.0, 20.0]) && said[0].contains("taken for K"), "{absolute:?} {said:?}");
+    // some do at 77, and at 225
+    for rows in [in_f, "0,1,1,0,225\n1,1,0,1,298\n"] {
+        assert!(of(head, rows).0[0] > 70.0 && of(head, rows).1.is_empty(), "{rows}");
+    }
+}
+
+#[test]
 fn units_that_are_ours_change_nothing_and_rows_keep_their_lines() {
     let text = "t_s,table_deg,xc_v,yc_v,note\ns,deg,V,V,-\n0,0,1,0,a\n1,10,x,1,b\n";
     let said = refusal(text, &[]);

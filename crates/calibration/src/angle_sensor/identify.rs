@@ -314,8 +314,8 @@ fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
                 let (value, deviation) = (-value / gain, deviation / gain.abs());
                 Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
             }
-            // the scale factor is k
-            Term::Scale => None,
+            // the scale factor is k, and a run's own bias is no effect of the instrument
+            Term::Scale | Term::BiasOf(_) => None,
         })
         .collect()
 }

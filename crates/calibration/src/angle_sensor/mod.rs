@@ -23,3 +23,4 @@ mod sensor;
 mod table_fit;
 
 pub(crate) use identify::{identify, serves};
+pub(crate) use samples::{span, unwrapped};

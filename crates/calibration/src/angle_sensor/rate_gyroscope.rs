@@ -18,6 +18,8 @@ use crate::estimation::statistics::robust_deviation;
 pub(crate) enum Term {
     /// b, rad/s
     Bias,
+    /// the bias of one run, rad/s
+    BiasOf(usize),
     /// s, of the reference's angle
     Scale,
     /// l, s
@@ -55,7 +57,7 @@ const REWEIGHTINGS: usize = 200;
 
 /// A stretch of a run: what is regressed on.
 #[derive(Debug, Clone)]
-struct Stretch {
+pub(super) struct Stretch {
     run: usize,
     t: Vec<f64>,
     reference: Vec<f64>,
@@ -90,13 +92,19 @@ impl Stretch {
     fn regressor(&self, term: Term, i: usize) -> f64 {
         match term {
             Term::Bias => self.t[i],
+            Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
             Term::Scale => self.reference[i],
             Term::Lag => self.rate[i],
         }
     }
 
+    /// Whether its rate varies by enough of the fastest one to tell what goes with the rate from what goes with the time.
+    fn varies(&self, fastest: f64) -> bool {
+        variance(&self.rate).sqrt() > VARYING_RATE * fastest
+    }
+
     /// What `values` of `terms` leave of the error.
-    fn left(&self, terms: &[Term], values: &[f64]) -> Vec<f64> {
+    pub(super) fn left(&self, terms: &[Term], values: &[f64]) -> Vec<f64> {
         (0..self.error.len())
             .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
             .collect()
@@ -230,8 +238,8 @@ impl RateGyroscope {
         };
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let raw = losses(&[], &vec![Vec::new(); splits.len()]);
-        let fastest = all.iter().flat_map(|s| &s.rate).fold(0.0, |m: f64, r| m.max(r.abs()));
-        let tells_lag = |s: &Stretch| variance(&s.rate).sqrt() > VARYING_RATE * fastest;
+        let fastest = fastest(&all);
+        let tells_lag = |s: &Stretch| s.varies(fastest);
         let without_lag = splits.iter().any(|s| !s.train.iter().any(tells_lag)).then_some(&WITHOUT_LAG);
         let candidates = SUBSETS.iter().chain(without_lag).flat_map(|t| ESTIMATORS.iter().map(move |e| (*t, *e))).map(
             |(terms, estimator)| {
@@ -277,21 +285,33 @@ impl RateGyroscope {
     }
 }
 
+fn fastest(all: &[Stretch]) -> f64 {
+    all.iter().flat_map(|s| &s.rate).fold(0.0, |m: f64, r| m.max(r.abs()))
+}
+
 /// A bias is carried over to another run only where it repeats between runs: where the others' mean predicts a run's
-/// worse than nothing does, it is zero, and the other terms are estimated with each run's own.
+/// worse than nothing does, it is zero, and the other terms are estimated with each run's own. Beside a scale factor that
+/// asks for a run whose rate varies: at one rate a bias of its own and a scale factor are the same.
 fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], estimator: Estimator, values: &mut [f64]) -> bool {
     let Some(at) = terms.iter().position(|t| *t == Term::Bias).filter(|_| all.len() > 1) else { return false };
-    let each: Vec<f64> = all.iter().map(|s| estimate(std::slice::from_ref(s), terms, estimator)[at]).collect();
+    let fastest = fastest(all);
+    if terms.contains(&Term::Scale) && !all.iter().any(|s| s.varies(fastest)) {
+        return false;
+    }
+    let biases = all.iter().map(|s| Term::BiasOf(s.run));
+    let own: Vec<Term> = biases.chain(terms.iter().copied().filter(|t| *t != Term::Bias)).collect();
+    let found = estimate(all, &own, estimator);
+    let (each, others) = found.split_at(all.len());
     let sum: f64 = each.iter().sum();
-    let others = |b: f64| (sum - b) / (each.len() - 1) as f64;
-    let by_others: f64 = each.iter().map(|b| (b - others(*b)).powi(2)).sum();
+    let mean_of_others = |b: f64| (sum - b) / (each.len() - 1) as f64;
+    let by_others: f64 = each.iter().map(|b| (b - mean_of_others(*b)).powi(2)).sum();
     if by_others < each.iter().map(|b| b * b).sum::<f64>() {
         return false;
     }
-    let own: Vec<Stretch> =
-        all.iter().zip(&each).map(|(s, b)| Stretch { error: s.left(&[Term::Bias], &[*b]), ..s.clone() }).collect();
-    values.copy_from_slice(&estimate(&own, terms, estimator));
-    values[at] = 0.0;
+    let mut others = others.iter();
+    for (i, value) in values.iter_mut().enumerate() {
+        *value = if i == at { 0.0 } else { others.next().copied().unwrap_or(0.0) };
+    }
     true
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::data::track::wrapped;
 use crate::diagnostics::allan::{self, FLICKER, Point};
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median};
+use crate::estimation::statistics::{line, median, robust_deviation};
 use crate::recording::{Campaign, Instrument, Run, RunKind};
 use crate::report::{Allan, AllanPoint, Estimate};
 
@@ -18,6 +18,13 @@ const GAP: f64 = 1.5;
 const SAME_INTERVAL: f64 = 1e-3;
 /// Angles below which a run tells nothing.
 const FEWEST: usize = 64;
+/// Steps of the angle, over so many samples, that exceed their robust deviation by this factor and are faster than a bias ever
+/// changes by are motion and no noise.
+const MOVES: f64 = 20.0;
+const FASTEST_DPS: f64 = 0.5;
+const OVER: [usize; 2] = [1, 8];
+/// Share of a run's rows that may be motion.
+const MOST_MOVING: f64 = 0.1;
 
 /// A run at rest as stretches without a gap.
 struct AtRest {
@@ -47,8 +54,11 @@ pub(crate) fn allan(
     period_deg: Option<f64>,
 ) -> Result<(Allan, Vec<Estimate>, Vec<String>), Refusal> {
     let period = period_deg.unwrap_or(if instrument == Instrument::Sensor { 360.0 } else { 180.0 });
-    let rests: Vec<AtRest> = runs.par_iter().map(|r| AtRest::new(r, period)).collect::<Result<_, _>>()?;
+    let mut rests: Vec<AtRest> = runs.par_iter().map(|r| AtRest::new(r, period)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
+    for rest in &mut rests {
+        warnings.extend(rest.without_motion()?);
+    }
     let Some(longest) = rests.iter().max_by(|a, b| a.length_s.total_cmp(&b.length_s)) else {
         return Err(Refusal::no_answer("campaign", "there is no run at rest", "a run with kind = \"static\""));
     };
@@ -150,6 +160,61 @@ impl AtRest {
         let length_s = t_s[t_s.len() - 1] - t_s[0];
         Ok(Self { name, interval_s, stretches, rate_dps: line(t_s, &followed).0, length_s })
     }
+
+    /// Leaves out rows in which the instrument moves, each as a gap; says so.
+    ///
+    /// # Errors
+    /// Where it moves too often to be at rest.
+    fn without_motion(&mut self) -> Result<Option<String>, Refusal> {
+        let moving: Vec<Vec<bool>> = self.stretches.iter().map(|s| moving(s, self.interval_s)).collect();
+        let count = moving.iter().flatten().filter(|m| **m).count();
+        if count == 0 {
+            return Ok(None);
+        }
+        let rows: usize = self.stretches.iter().map(Vec::len).sum();
+        let before: usize = moving.iter().take_while(|m| !m.contains(&true)).map(Vec::len).sum();
+        let within = moving.iter().find_map(|m| m.iter().position(|m| *m)).unwrap_or(0);
+        let from_s = (before + within) as f64 * self.interval_s;
+        let what =
+            format!("the instrument moves in {count} of {rows} rows at rest, first {from_s:.1} s after its begin");
+        if count as f64 > MOST_MOVING * rows as f64 {
+            return Err(Refusal::no_answer(
+                &self.name,
+                what,
+                "a run at rest, or kind = \"rotation\" with what turned it",
+            ));
+        }
+        let split = self.stretches.iter().zip(&moving).flat_map(|(angles, moving)| {
+            let rows: Vec<(f64, bool)> = angles.iter().copied().zip(moving.iter().copied()).collect();
+            let still = rows.chunk_by(|a, b| a.1 == b.1).filter(|part| !part[0].1);
+            still.map(|part| part.iter().map(|(angle, _)| *angle).collect()).collect::<Vec<Vec<f64>>>()
+        });
+        self.stretches = split.collect();
+        if let Some(longest) = self.stretches.iter().max_by_key(|s| s.len()) {
+            let t_s: Vec<f64> = (0..longest.len()).map(|i| i as f64 * self.interval_s).collect();
+            self.rate_dps = line(&t_s, longest).0;
+        }
+        Ok(Some(format!("{}: {what}; they are left out, and no difference reaches across", self.name)))
+    }
+}
+
+/// The rows of a stretch in which the angle moves by far more than it does as a rule, about its mean rate.
+fn moving(angles: &[f64], interval_s: f64) -> Vec<bool> {
+    let mut out = vec![false; angles.len()];
+    for over in OVER.into_iter().filter(|over| angles.len() > FEWEST * over) {
+        let mut steps: Vec<f64> = angles.windows(over + 1).map(|w| w[over] - w[0]).collect();
+        let usual = median(&mut steps.clone());
+        steps.iter_mut().for_each(|d| *d -= usual);
+        let bias = FASTEST_DPS * over as f64 * interval_s;
+        // an angle in digits steps by one or two of them
+        let largest = steps.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        let digit = steps.iter().map(|d| d.abs()).filter(|d| *d > 1e-9 * largest).fold(largest, f64::min);
+        let limit = (MOVES * robust_deviation(steps.iter().copied())).max(bias).max(3.0 * digit);
+        for (at, _) in steps.iter().enumerate().filter(|(_, d)| d.abs() > limit) {
+            out[at..=at + over].fill(true);
+        }
+    }
+    out
 }
 
 /// The angle of an envelope: of the pattern, or of the vector where it goes round once a turn.

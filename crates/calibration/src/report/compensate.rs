@@ -9,6 +9,7 @@ use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
+use crate::report::belonging::{Row, require_of_the_calibrated};
 use crate::report::calibration::Calibration;
 use crate::report::provenance::amplitude;
 
@@ -35,7 +36,8 @@ const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3
 /// ```
 ///
 /// # Errors
-/// Where the recording has no angle, no reference though the calibration needs one, or another unit than the calibration.
+/// Where the recording has no angle, no reference though the calibration needs one, or another unit than the calibration, and
+/// where it is none of the calibrated instrument: its angle turns otherwise, or undoing the calibration makes it worse.
 pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Recording, Refusal> {
     let h = &portable(&calibration.hypothesis);
     same_unit(calibration, recording)?;
@@ -55,6 +57,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     }
     let mut out = recording.clone();
     let mut angle_rad: Vec<f64> = Vec::new();
+    let mut rows = Vec::with_capacity(recording.len());
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
     let none = Unknowns::new(h, Vec::new());
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
@@ -65,6 +68,13 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
             let seen = track.envelope(i);
             let (sin, cos) = (-row.drift).sin_cos();
             let z = h.unread(seen, &at).turned(sin, cos);
+            let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
+            rows.push(Row {
+                t_s: track.t_s[i],
+                input_rad: track.input_rad[i],
+                angle_rad: [h.bearing(&seen), h.bearing(&z) - drift_rad],
+                radius: [seen.x_c.hypot(seen.y_c), z.x_c.hypot(z.y_c)],
+            });
             if channels {
                 for (column, value) in
                     [(&mut out.xc_v, z.x_c), (&mut out.xs_v, z.x_s), (&mut out.yc_v, z.y_c), (&mut out.ys_v, z.y_s)]
@@ -75,7 +85,6 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
                 }
             }
             if let Some(theta) = &mut out.theta_deg {
-                let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
                 theta[i] += (wrapped(h.bearing(&z) - h.bearing(&seen), h.period_rad) - drift_rad).to_degrees();
             }
             if channels && recording.theta_deg.is_none() {
@@ -83,6 +92,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
             }
         });
     }
+    require_of_the_calibrated(calibration, recording, &rows)?;
     if channels && recording.theta_deg.is_none() {
         let mut last = angle_rad.first().copied().unwrap_or(0.0);
         out.theta_deg = Some(

@@ -137,7 +137,7 @@ fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
 }
 
 /// The unit in which rates, angles or times would have to be for a gain to be possible.
-fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
+pub(crate) fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
     const UNITS: [(f64, &str); 7] = [
         (
             1.0 / 57.295_78,
@@ -156,7 +156,7 @@ fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
         (1e-6, "t_s in s: it looks as if in µs (t_s = \"…*0.000001\" in [columns], or by --map)"),
         (1.0 / 3600.0, "rate_dps in deg/s: it looks as if in deg/h"),
     ];
-    let usual = |k: f64| stated.map_or(USUAL_GAIN.contains(&k.abs()), |s| (k / s - 1.0).abs() < 0.2);
+    let usual = |k: f64| stated.map_or(USUAL_GAIN.contains(&k.abs()), |s| ((k / s).abs() - 1.0).abs() < 0.2);
     UNITS.iter().find(|(factor, _)| usual(k / factor)).map(|(_, what)| *what)
 }
 

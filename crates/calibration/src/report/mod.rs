@@ -1,5 +1,6 @@
 //! What was found, as facts that can be written: the report, the calibration, and recordings with the errors taken out.
 
+pub(crate) mod belonging;
 pub mod calibration;
 pub(crate) mod channels;
 pub(crate) mod compensate;

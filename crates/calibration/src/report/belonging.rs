@@ -1,0 +1,139 @@
+//! Whether a recording is of the instrument that a calibration was made of. A calibration names its device, a recording does
+//! not: what tells is that the angle turns as far as the calibrated one and the same way, and that undoing the calibration
+//! does not make the angle, or the radius of a sensor without a reference, worse.
+
+use crate::angle_sensor::{span, unwrapped};
+use crate::data::track::wrapped;
+use crate::error::Refusal;
+use crate::estimation::linear::NormalEquations;
+use crate::estimation::statistics::{line, median, robust_deviation};
+use crate::model::hypothesis::Hypothesis;
+use crate::recording::{Instrument, Recording};
+use crate::report::calibration::Calibration;
+use crate::report::gate::unit;
+
+/// A row of a recording as it was read and with the calibration undone.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) t_s: f64,
+    /// what the reference turned through, rad
+    pub(crate) input_rad: f64,
+    /// before and after, rad
+    pub(crate) angle_rad: [f64; 2],
+    /// before and after, in the unit of the readout
+    pub(crate) radius: [f64; 2],
+}
+
+/// Rows below which nothing is told.
+const FEWEST_ROWS: usize = 64;
+/// A reference that turns by less is at rest.
+const LEAST_TURN_RAD: f64 = 0.1;
+/// Share of the calibrated angular gain by which a recording of the same instrument may be off …
+const SHARE: f64 = 0.1;
+/// … or what a drift may add to the angle, rad/s: 5 deg/s, as much as a rate gyroscope's bias may be.
+const LARGEST_DRIFT_RAD_S: f64 = 0.087;
+/// An error that grows by more than this factor grows by the calibration and not by chance.
+const WORSE: f64 = 1.05;
+
+/// Refuses a recording of another instrument.
+///
+/// # Errors
+/// Where the recording shows that it is none of the calibrated instrument, or not read as that was.
+pub(crate) fn require_of_the_calibrated(
+    calibration: &Calibration,
+    recording: &Recording,
+    rows: &[Row],
+) -> Result<(), Refusal> {
+    let h = &calibration.hypothesis;
+    let refuse = |problem: String, unit: Option<&str>| {
+        let same = format!(
+            "a recording of {}, the calibrated instrument, with its channels in their places and its reference in the unit of \
+             its column",
+            calibration.device
+        );
+        Err(Refusal::new(&recording.source.display().to_string(), problem, unit.map_or(same, str::to_owned)))
+    };
+    let [turns, goes_round] = [turns(rows, h), goes_round(rows, h.period_rad)];
+    if turns {
+        let (gain, is_another) = turned(rows, h);
+        if is_another {
+            let (own, calibrated) = (gain * h.sense(), h.angular_gain);
+            let problem = format!(
+                "its angle turns {own:.4} times as far as its reference, that of the calibration {calibrated:.4} times"
+            );
+            return refuse(problem, unit(own, Some(calibrated)).filter(|_| own * calibrated > 0.0));
+        }
+        let [before, after] = [0, 1].map(|i| angle_error(rows, gain, h.period_rad, i).to_degrees());
+        if after > WORSE * before {
+            let problem =
+                format!("with the calibration undone its angle is off by {after:.4}°, as recorded by {before:.4}°");
+            return refuse(problem, None);
+        }
+    }
+    let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
+    if h.instrument == Instrument::Sensor && channels && goes_round {
+        let [before, after] = [0, 1].map(|i| 100.0 * radius_error(rows, i));
+        if after > WORSE * before {
+            let problem =
+                format!("with the calibration undone its radius is off by {after:.2} %, as recorded by {before:.2} %");
+            return refuse(problem, None);
+        }
+    }
+    Ok(())
+}
+
+/// Whether the reference turns, and the angle goes round once and more, or would.
+fn turns(rows: &[Row], h: &Hypothesis) -> bool {
+    let input = span(&rows.iter().map(|r| r.input_rad).collect::<Vec<_>>());
+    let angle = span(&unwrapped(rows.iter().map(|r| r.angle_rad[1]), h.period_rad));
+    rows.len() >= FEWEST_ROWS && input > LEAST_TURN_RAD && angle.max(input * h.angular_gain.abs()) > h.period_rad
+}
+
+/// How many times as far as the reference the compensated angle turns, with its sign, and whether that is another
+/// instrument's. A sensor on a table that counts the other way reads as it did.
+fn turned(rows: &[Row], h: &Hypothesis) -> (f64, bool) {
+    let input: Vec<f64> = rows.iter().map(|r| r.input_rad).collect();
+    let seconds = rows[rows.len() - 1].t_s - rows[0].t_s;
+    let travel: f64 = input.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
+    let speed = travel / seconds.max(f64::MIN_POSITIVE);
+    let beside = |gain: f64| (gain, line(&input, &followed(rows, gain, h.period_rad, 1)).0);
+    let (as_it_was, reversed) = (beside(h.precession(1.0)), beside(-h.precession(1.0)));
+    let is_reversed = h.instrument == Instrument::Sensor && reversed.1.abs() < as_it_was.1.abs();
+    let (gain, off) = if is_reversed { reversed } else { as_it_was };
+    (gain + off, off.abs() > SHARE * gain.abs() && off.abs() * speed > LARGEST_DRIFT_RAD_S)
+}
+
+/// What the angle has beside that of an instrument of this gain, followed through its period.
+fn followed(rows: &[Row], gain: f64, period: f64, after: usize) -> Vec<f64> {
+    unwrapped(rows.iter().map(|r| wrapped(r.angle_rad[after] - gain * r.input_rad, period)), period)
+}
+
+/// Robust deviation of the angle from the best line over reference and time, rad.
+fn angle_error(rows: &[Row], gain: f64, period: f64, after: usize) -> f64 {
+    let error = followed(rows, gain, period, after);
+    let mut equations = NormalEquations::new(3);
+    let first_s = rows[0].t_s;
+    let row = |r: &Row| [1.0, r.input_rad, r.t_s - first_s];
+    rows.iter().zip(&error).for_each(|(r, e)| equations.add(&row(r), *e));
+    let x = equations.solve();
+    let left = |(r, e): (&Row, &f64)| e - row(r).iter().zip(&x).map(|(a, b)| a * b).sum::<f64>();
+    robust_deviation(rows.iter().zip(&error).map(left))
+}
+
+/// Whether the compensated angle goes round, so that the radius is seen all around.
+fn goes_round(rows: &[Row], period: f64) -> bool {
+    const PARTS: usize = 12;
+    let mut seen = [false; PARTS];
+    for r in rows {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a turn")]
+        let part = (r.angle_rad[1].rem_euclid(period) / period * PARTS as f64) as usize;
+        seen[part.min(PARTS - 1)] = true;
+    }
+    rows.len() >= FEWEST_ROWS && seen.iter().all(|s| *s)
+}
+
+/// Robust deviation of the radius, as a share of it.
+fn radius_error(rows: &[Row], after: usize) -> f64 {
+    let usual = median(&mut rows.iter().map(|r| r.radius[after]).collect::<Vec<_>>());
+    robust_deviation(rows.iter().map(|r| r.radius[after] / usual - 1.0))
+}
