@@ -40,7 +40,7 @@ pub(crate) fn columns(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
 fn named(name: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<(String, Values)> {
     let py = name.py();
     let numpy = py.import("numpy")?;
-    let array = numpy.call_method1("asarray", (values,))?;
+    let array = numpy.call_method1("asarray", (unmasked(&numpy, values)?,))?;
     let name: String = name.str()?.extract()?;
     if array.getattr("ndim")?.extract::<usize>()? != 1 {
         return Err(bad(py, format!("column `{name}` is no array of one dimension; wanted one value a row")));
@@ -56,6 +56,19 @@ fn named(name: &Bound<'_, PyAny>, values: &Bound<'_, PyAny>) -> PyResult<(String
         cells.push(&value?.str()?.to_string_lossy());
     }
     Ok((name, Values::Texts(cells)))
+}
+
+/// A masked array with nothing in its masked cells: `asarray` would give what lies beneath the mask.
+fn unmasked<'py>(numpy: &Bound<'py, PyModule>, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if !numpy.getattr("ma")?.call_method1("isMaskedArray", (values,))?.extract()? {
+        return Ok(values.clone());
+    }
+    let kind: String = values.getattr("dtype")?.getattr("kind")?.extract()?;
+    if NUMBERS.contains(&kind) {
+        values.call_method1("astype", ("f8",))?.call_method1("filled", (f64::NAN,))
+    } else {
+        values.call_method1("astype", ("O",))?.call_method1("filled", ("",))
+    }
 }
 
 /// What columns are called, from `CHANNEL=COLUMN*FACTOR`.

@@ -76,6 +76,19 @@ def test_a_file_of_the_name_of_a_frame_is_not_taken_for_it(folder, tmp_path, mon
     assert report.inputs == [{"file": "bench", "crc32": None}]
 
 
+def test_what_a_mask_hides_is_missing_and_not_read(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    plain = {name: table[name].to_numpy() for name in table.columns}
+    hidden = numpy.zeros(len(table), dtype=bool)
+    hidden[300:340] = True
+    absent, masked = dict(plain), dict(plain)
+    absent["xc_v"] = numpy.where(hidden, numpy.nan, plain["xc_v"])
+    # beneath the mask stands what was never measured
+    masked["xc_v"] = numpy.ma.masked_array(numpy.where(hidden, 0.5, plain["xc_v"]), hidden)
+    read = [cvg.identify(columns, name="bench").to_json() for columns in (absent, masked, plain)]
+    assert read[0] == read[1] != read[2]
+
+
 def test_the_report_has_its_facts_as_attributes_frames_and_a_page(report):
     assert report.status == "answered" and report.device == "unit-07"
     assert report.heldout["discovered"]["rms_deg"] < report.heldout["raw"]["rms_deg"]
