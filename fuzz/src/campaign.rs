@@ -33,6 +33,9 @@ static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
     for (name, text) in files {
         fs::write(folder.path().join(name), text).expect("a temporary file");
     }
+    // three rows of two channels as f32, six as i16, and half a row
+    let scope: Vec<u8> = (0..13_i16).flat_map(|k| (k * 1021).to_le_bytes()).collect();
+    fs::write(folder.path().join("scope.bin"), scope).expect("a temporary file");
     folder
 });
 

@@ -14,6 +14,10 @@ pub(crate) const SHARED: u16 = 37;
 const LAST: u16 = 40;
 /// Standard deviations of a direction that is committed.
 const SIGMAS: f64 = 3.0;
+/// The same while it turns: ratio and skew are told anew all the time then, and what is beyond its 95 % interval is followed.
+const SIGMAS_TURNING: f64 = 2.0;
+/// So many times what is expected of devices is no device.
+const NO_DEVICE: i32 = 5;
 /// How well the antisymmetric part of the split vanishes, rad/s.
 const SYMMETRY: f64 = 1e-4;
 
@@ -98,7 +102,8 @@ impl<T: Float> Calibrator<T> {
     fn detection(&self, s: &State<T>, delta: &mut Vector<T>) {
         let ud = &s.filter.ud;
         let (ratio, skew, phase) = (Parameter::DetectionRatio, Parameter::DetectionSkew, Parameter::DetectionPhase);
-        let beyond = T::from_f64(SIGMAS * SIGMAS);
+        let sigmas = if s.schedule.stage >= 4 && s.schedule.moving > 0 { SIGMAS_TURNING } else { SIGMAS };
+        let beyond = T::from_f64(sigmas * sigmas);
         let m = get(&s.filter.mean, phase);
         let v = ud.variance(phase as usize);
         if m * m > beyond * v && v < T::ratio(1, 4) {
@@ -145,16 +150,28 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
+    /// Whether what is believed of the detection could be that of a device.
+    fn is_of_a_device(&self, s: &State<T>) -> bool {
+        let most = T::ratio(NO_DEVICE, 1);
+        let believed = [
+            (Parameter::DetectionRatio, s.correction.detection_ratio()),
+            (Parameter::DetectionSkew, s.correction.detection_skew()),
+            (Parameter::DetectionPhase, s.correction.detection_phase()),
+        ];
+        // false for NaN
+        believed.into_iter().all(|(p, in_force)| (in_force / p.expected() + get(&s.filter.mean, p)).within(most))
+    }
+
     fn put_in_force(&self, s: &mut State<T>) {
         s.schedule.commit = Commit::None;
         s.score = T::zero();
         let trial = s.trial;
         s.trial = [T::zero(); N];
-        let Some(moved) = s.correction.moved(&trial) else {
-            // no instrument is like that: what led there is forgotten
+        let Some(moved) = s.correction.moved(&trial).filter(|_| self.is_of_a_device(s)) else {
+            // no instrument is like that: what led there is forgotten, but for the mechanics about which it is learned anew
             s.filter.ud = Ud::diagonal(T::one());
             s.filter.mean = [T::zero(); N];
-            self.resume(s);
+            self.split_changed(s);
             return;
         };
         s.correction = moved;
@@ -170,6 +187,7 @@ impl<T: Float> Calibrator<T> {
         }
         if !tracking {
             sc.stage += 1;
+            sc.before_rest = 0;
         } else {
             for (slot, (delta, p)) in s.trial.iter_mut().zip(trial.iter().zip(Parameter::ALL)) {
                 *slot = *delta / p.expected::<T>();
@@ -201,6 +219,7 @@ impl<T: Float> Calibrator<T> {
     /// The loops settle on the new compensation.
     fn resume(&self, s: &mut State<T>) {
         s.schedule.used = 0;
+        s.schedule.swept = T::zero();
         s.schedule.settle = self.cycles(3) / 2;
         s.schedule.fresh = 0;
         s.before.whole = false;

@@ -279,6 +279,7 @@ impl<T: Float> Calibrator<T> {
             + T::two() * doubt.rate;
         let sc = &mut s.schedule;
         sc.rate = sc.turn * self.cycles_per_s;
+        sc.swept = sc.swept + sc.turn.magnitude();
         sc.unexplained = sc.unexplained + T::ratio(1, 5) * (sc.rate - sc.unexplained);
         if !sc.unexplained.within(limit) {
             if sc.moving == 0 {
@@ -287,6 +288,9 @@ impl<T: Float> Calibrator<T> {
                 if sc.stage == 0 {
                     s.filter.forget_others(T::one());
                     sc.used = 0;
+                } else if sc.stage == 1 && sc.angle_used < self.cycles(10) {
+                    // too short a rest to learn anything from: on as before it
+                    sc.stage = sc.stage.max(sc.before_rest);
                 }
             }
             sc.moving = self.cycles(2);
@@ -297,6 +301,7 @@ impl<T: Float> Calibrator<T> {
             put(&mut sc.hold, 1, self.cycles(1));
             if sc.moving == 0 && sc.angle_used < self.cycles(10) && sc.stage > 1 {
                 // the first rest: scale, rotation and rate were never seen before
+                sc.before_rest = sc.stage;
                 sc.stage = 1;
                 sc.used = 0;
             }

@@ -255,6 +255,7 @@ impl<T: Float> Calibrator<T> {
         state.filter.forget_others(T::one());
         let sc = &mut state.schedule;
         sc.stage = 0;
+        sc.before_rest = 0;
         sc.used = 0;
         sc.uses_of_symmetry = 0;
         sc.refused = 0;

@@ -5,8 +5,13 @@ use cvg_model::Float;
 use crate::Calibrator;
 use crate::state::{Commit, State};
 
-/// Seconds of use in each stage before what was learned is committed; the last is repeated.
-const STAGE_S: [u16; 5] = [10, 10, 20, 20, 40];
+/// Seconds of use in each of the stages that linearise, before what was learned is committed.
+const STAGE_S: [u16; 4] = [10, 10, 20, 20];
+/// And from one commit to the next after them, at rest: as long as the precession takes to go to and fro at both speeds.
+const REST_S: u16 = 40;
+/// While it turns, where the rotation has swept half a turn of the pattern since, and where it has not.
+const SWEPT_S: u16 = 10;
+const TURNING_S: u16 = 20;
 /// How much less likely the held-out innovations have to be for a commit to be taken back, as a logarithm.
 const WORSE: i32 = 20;
 
@@ -34,7 +39,12 @@ impl<T: Float> Calibrator<T> {
             sc.commit = Commit::Back;
             return;
         }
-        let due = STAGE_S.get(usize::from(sc.stage)).copied().unwrap_or(40);
+        let due = match STAGE_S.get(usize::from(sc.stage)) {
+            Some(stage_s) => *stage_s,
+            None if sc.moving > 0 && sc.swept > T::PI => SWEPT_S,
+            None if sc.moving > 0 => TURNING_S,
+            None => REST_S,
+        };
         if sc.used >= u32::from(self.cycles(due)) {
             sc.commit = Commit::Forth;
         }

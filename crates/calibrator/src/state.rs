@@ -58,11 +58,15 @@ pub(crate) struct Schedule<T> {
     /// the rate that nothing explains, low-passed, rad/s
     pub(crate) unexplained: T,
     pub(crate) turn: T,
+    /// rotation since the last commit, back and forth, rad
+    pub(crate) swept: T,
     pub(crate) rate: T,
     pub(crate) profile: u32,
     pub(crate) fresh: u16,
     /// twice the innovations beyond all expectation, less those within
     pub(crate) refused: u16,
+    /// the stage that the first rest interrupted
+    pub(crate) before_rest: u8,
     /// cycles since rotation told the detection
     pub(crate) untold: u16,
     pub(crate) excited: bool,
@@ -158,10 +162,12 @@ impl<T: Float> Schedule<T> {
             uses_of_symmetry: 0,
             unexplained: zero,
             turn: zero,
+            swept: zero,
             rate: zero,
             profile: 0,
             fresh: 0,
             refused: 0,
+            before_rest: 0,
             untold: u16::MAX,
             excited: false,
             live: false,

@@ -160,7 +160,7 @@ fn print_reductions(life: Life, outcomes: &[Outcome], first: u64) {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Followed {
     pub(super) believed_rms: f64,
-    in_force_rms: f64,
+    pub(super) in_force_rms: f64,
     in_force_most: f64,
     pub(super) said: bool,
 }

@@ -30,6 +30,7 @@ fn due(stage: u8) -> State<f64> {
     s.filter.mean = core::array::from_fn(|j| 0.3 * (((j * 37 + 11) % 23) as f64 / 23.0 - 0.4));
     (s.schedule.live, s.schedule.stage, s.schedule.commit) = (true, stage, Commit::Forth);
     (s.schedule.fresh, s.schedule.used, s.schedule.settle, s.before.whole) = (9, 500, 0, true);
+    s.schedule.swept = 7.0;
     s
 }
 
@@ -88,6 +89,7 @@ fn the_others_are_committed_as_they_are_given_what_is_committed_of_the_detection
         assert_eq!(after.schedule.stage, 4);
         assert!(after.filter.ud == before.filter.ud, "the third stage goes on with what it knows");
         assert_eq!((after.schedule.used, after.schedule.fresh, after.before.whole), (0, 0, false));
+        assert_eq!(after.schedule.swept, 0.0);
         assert_eq!((after.schedule.settle, after.schedule.commit, after.score), (37, Commit::None, 0.0));
         assert_eq!(after.trial, [0.0; N], "only the last stage is on trial");
     }
@@ -108,6 +110,17 @@ fn a_direction_of_the_detection_is_committed_beyond_three_deviations_only() {
                     near(by[OTHERS + k], if share > 1.05 { v } else { 0.0 }, 1e-12);
                 }
             }
+        }
+    }
+    // in the last stage, while it turns, beyond two
+    for (stage, moving, sigmas) in [(4, 1, 2.0), (4, 0, 3.0), (3, 1, 3.0)] {
+        for share in [0.99, 1.01] {
+            let mut before = due(stage);
+            before.filter.ud = Ud::diagonal(1e-4);
+            before.filter.mean = unit(P::DetectionRatio, 1e-2 * sigmas * share);
+            before.schedule.moving = moving;
+            let expected = if share > 1.0 { 1e-2 * sigmas * share } else { 0.0 };
+            near(moved(&before, &committed(before))[P::DetectionRatio as usize], expected, 1e-12);
         }
     }
     // a phase that is hardly known is not, whatever its mean
@@ -149,7 +162,9 @@ fn each_stage_commits_what_it_may_and_forgets_as_it_should() {
             let mut before = due(stage);
             before.filter.ud = Ud::diagonal(0.01);
             before.schedule.angle_used = used;
+            before.schedule.before_rest = 4;
             let after = committed(before);
+            assert_eq!(after.schedule.before_rest, 0, "the stages go on from here");
             for p in P::ALL.into_iter().take(OTHERS) {
                 let untold = matches!(p, P::ForceScale | P::ForceRotation | P::Rate) && used < 250;
                 let moved = !untold && (stage > 0 || coarse.contains(&p));
@@ -215,7 +230,36 @@ fn a_commit_of_no_device_moves_nothing_and_begins_anew() {
     let after = committed(before);
     assert_eq!(after.correction, before.correction);
     assert_eq!((after.filter.mean, after.filter.ud), ([0.0; N], Ud::diagonal(1.0)));
-    assert_eq!((after.schedule.commit, after.schedule.settle), (Commit::None, 37));
+    assert_eq!((after.schedule.commit, after.schedule.settle, after.schedule.stage), (Commit::None, 37, 0));
+}
+
+/// Five times what is expected of devices, in force and believed together, and not a bit more.
+#[test]
+fn a_detection_of_no_device_is_forgotten_and_the_mechanics_in_force_are_kept() {
+    let known = unit(P::SplitCos, 1.0);
+    for p in [P::DetectionRatio, P::DetectionSkew, P::DetectionPhase] {
+        for (in_force, believed, kept) in [
+            (0.0, 4.9, true),
+            (0.0, 5.1, false),
+            (2.0, 2.8, true),
+            (2.0, 3.3, false),
+            (0.0, -5.1, false),
+            (0.0, f64::NAN, false),
+        ] {
+            let mut before = due(3);
+            let mut started = known;
+            started[p as usize] = in_force * p.expected::<f64>();
+            before.correction = before.correction.moved(&started).expect("of a device");
+            before.filter.ud = Ud::diagonal(1e-4);
+            before.filter.mean = unit(p, believed);
+            let after = committed(before);
+            assert_eq!(after.schedule.stage == 4, kept, "{p:?} {in_force} {believed}");
+            if !kept {
+                assert_eq!(after.correction, before.correction);
+                assert_eq!((after.filter.mean, after.filter.ud), ([0.0; N], Ud::diagonal(1.0)));
+            }
+        }
+    }
 }
 
 #[test]
@@ -274,6 +318,7 @@ fn a_split_is_symmetric_and_what_is_not_is_the_detections() {
 fn a_change_of_the_split_forgets_the_mechanics_and_keeps_the_detection() {
     let mut s = due(4);
     (s.schedule.uses_of_symmetry, s.schedule.refused, s.schedule.angle_used) = (5, 900, 300);
+    s.schedule.before_rest = 4;
     (s.trial, s.score) = ([0.1; N], 3.0);
     let before = s;
     calibrator().split_changed(&mut s);
@@ -291,7 +336,7 @@ fn a_change_of_the_split_forgets_the_mechanics_and_keeps_the_detection() {
     }
     let sc = s.schedule;
     assert_eq!((sc.stage, sc.used, sc.uses_of_symmetry, sc.refused, sc.angle_used), (0, 0, 0, 0, 0));
-    assert_eq!((sc.commit, sc.settle, sc.fresh), (Commit::None, 37, 0));
+    assert_eq!((sc.commit, sc.settle, sc.fresh, sc.before_rest), (Commit::None, 37, 0, 0));
     assert_eq!((s.trial, s.score, s.before.whole), ([0.0; N], 0.0, false));
     assert_eq!(s.correction, before.correction);
 }

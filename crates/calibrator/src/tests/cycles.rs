@@ -235,6 +235,7 @@ fn rotation_is_noticed_by_what_nothing_explains_of_the_angle() {
             (s.sample.push.aside, s.schedule.turn) = (0.0, sign * 5.0 * rate / 25.0);
             calibrator().detect(&mut s);
             near(s.schedule.rate, sign * 5.0 * rate, 1e-14);
+            near(s.schedule.swept, busy().schedule.swept + 5.0 * rate / 25.0, 1e-14);
             near(s.schedule.unexplained, sign * rate, 1e-14);
             assert_eq!(s.schedule.excited, moving, "{rate}");
             assert_eq!((s.schedule.moving, s.schedule.hold[1]), if moving { (49, 25) } else { (0, 0) });
@@ -266,6 +267,22 @@ fn rotation_is_noticed_by_what_nothing_explains_of_the_angle() {
     };
     assert_eq!((stage(249, 4), stage(249, 2)), ((1, 0), (1, 0)));
     assert_eq!((stage(250, 4), stage(249, 1), stage(249, 0)), ((4, 99), (1, 99), (0, 99)));
+    // and where it was too short to tell anything, what was learned before it goes on
+    let resumed = |used: u16, stage: u8, before: u8| {
+        let mut s = busy();
+        (s.sample.push.aside, s.schedule.turn) = (0.0, 5.0 * 0.1 / 25.0);
+        (s.schedule.angle_used, s.schedule.stage, s.schedule.before_rest) = (used, stage, before);
+        calibrator().detect(&mut s);
+        assert!(s.schedule.excited);
+        s.schedule.stage
+    };
+    assert_eq!([resumed(249, 1, 4), resumed(249, 1, 2), resumed(249, 1, 0)], [4, 2, 1]);
+    assert_eq!([resumed(250, 1, 4), resumed(249, 2, 4), resumed(249, 0, 4)], [1, 2, 0]);
+    let mut s = busy();
+    s.sample.push.aside = 0.0;
+    (s.schedule.moving, s.schedule.angle_used, s.schedule.stage) = (1, 100, 3);
+    calibrator().detect(&mut s);
+    assert_eq!((s.schedule.stage, s.schedule.before_rest), (1, 3));
     // loops settle before anything is integrated
     let s = detect(|s| s.schedule.settle = 2);
     assert_eq!((s.schedule.settle, s.schedule.fresh), (1, 0));
@@ -474,6 +491,16 @@ fn a_commit_is_due_after_the_seconds_of_its_stage() {
         assert_eq!((due(last - 1, 0.0), due(last, 0.0)), ((last, Commit::None), (last + 1, Commit::Forth)));
         // what predicts far worse than before is taken back at once
         assert_eq!((due(3, -20.0).1, due(3, -20.001).1), (Commit::None, Commit::Back));
+    }
+    // while it turns, every twenty seconds, and every ten where it has swept half a turn
+    for (stage, swept, seconds) in [(3, 9.0, 20), (4, 3.1, 20), (4, 3.2, 10)] {
+        let due = |used: u32| {
+            let mut s = busy();
+            (s.schedule.stage, s.schedule.used, s.schedule.moving, s.schedule.swept) = (stage, used, 1, swept);
+            c.plan(&mut s);
+            s.schedule.commit
+        };
+        assert_eq!((due(25 * seconds - 2), due(25 * seconds - 1)), (Commit::None, Commit::Forth));
     }
     // when for long nothing is as it was learned, the mechanics are others now
     let mut s = busy();
