@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use cvg_model::effects::EffectId;
-use cvg_recording::write_parquet_numbers;
 use serde::Serialize;
 
 use crate::carrier::displacement;
@@ -69,6 +68,7 @@ impl SimulatedRun {
     fn write(&self, dir: &Path) -> Result<(), WriteError> {
         let path = dir.join(self.run.file());
         let written = match Kind::of(&self.run) {
+            #[cfg(feature = "parquet")]
             Kind::Parquet => self.parquet(&path),
             Kind::Raw => self.raw(&path),
             Kind::Csv => fs::write(&path, self.csv()),
@@ -76,9 +76,10 @@ impl SimulatedRun {
         written.map_err(|source| WriteError { path, source })
     }
 
+    #[cfg(feature = "parquet")]
     fn parquet(&self, path: &Path) -> io::Result<()> {
         let columns: Vec<(&str, &[f64])> = self.columns.iter().map(|c| (c.name, c.values.as_slice())).collect();
-        write_parquet_numbers(&columns, io::BufWriter::new(fs::File::create(path)?))
+        cvg_recording::write_parquet_numbers(&columns, io::BufWriter::new(fs::File::create(path)?))
     }
 
     /// All columns but the time, row by row, as little-endian floating point of 32 bits.
@@ -124,6 +125,7 @@ impl SimulatedRun {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Csv,
+    #[cfg(feature = "parquet")]
     Parquet,
     Raw,
 }
@@ -131,6 +133,7 @@ enum Kind {
 impl Kind {
     fn of(run: &Run) -> Self {
         match run.file().rsplit_once('.') {
+            #[cfg(feature = "parquet")]
             Some((_, "parquet")) => Self::Parquet,
             Some((_, "f32")) => Self::Raw,
             _ => Self::Csv,

@@ -189,12 +189,13 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
 /// A plain name in the campaign's own folder.
 fn file_name(name: &str, is_at_carrier: bool) -> Result<(), String> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "+-_.".contains(c));
-    let ends = [".csv", ".parquet"].iter().any(|end| name.ends_with(end));
+    let ends = name.ends_with(".csv") || cfg!(feature = "parquet") && name.ends_with(".parquet");
     // raw numbers have no time, which those of the converters do not need
     let is_raw = is_at_carrier && name.ends_with(".f32");
     if name.is_empty() || !plain || name.starts_with('.') || !(ends || is_raw) {
         return Err(format!(
-            "{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv or .parquet, or at the carrier in .f32"
+            "{name:?} is not a plain name of letters, digits and + - _ . that ends in .csv{}, or at the carrier in .f32",
+            if cfg!(feature = "parquet") { " or .parquet" } else { "" }
         ));
     }
     Ok(())
