@@ -39,6 +39,8 @@ const LARGEST_ANGLE_ERROR_RAD: f64 = 0.35;
 const STEADY_SHARE: f64 = 0.6;
 /// Fewest samples in either phase.
 const FEWEST: usize = 20;
+/// Commands per amplitude that differ by less than this share are the same, and one below this share of another is none.
+const SAME_COMMAND: f64 = 0.1;
 /// Points of the decay that are kept for the report.
 const KEPT_POINTS: usize = 400;
 
@@ -118,6 +120,12 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             "at least 20 of each around energy_off_s",
         );
     }
+    if let Some(why) = command_that_goes_on(run, settled, energy_off_s) {
+        return refuse(
+            why,
+            "vas_v = the energy control output, which vanishes at energy_off_s, and vqc_v = quadrature's",
+        );
+    }
     let (rate, rate_error) = loop {
         let (rate, error, intercept) = decay_rate(&off.0, &off.1);
         let keep = without_spikes(&off.0, &off.1, |t| intercept - rate * t);
@@ -153,6 +161,50 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         drive_error: STUDENT_11 * mean_error(&on.2, mean),
         decay,
     })
+}
+
+/// Why vas_v is not what held the amplitude: it goes on, in proportion to the amplitude that decays without it, as the
+/// quadrature command does; or vqc_v vanishes in its stead. An output that stands still, or that goes on alone because the
+/// drive was disconnected behind it, does neither.
+fn command_that_goes_on(run: &Run, settled: std::ops::Range<usize>, energy_off_s: f64) -> Option<String> {
+    let r = &run.recording;
+    let rows: Vec<(f64, f64)> = settled
+        .clone()
+        .map(|i| {
+            let squares = [&r.xc_v, &r.xs_v, &r.yc_v, &r.ys_v].into_iter().flatten().map(|v| v[i] * v[i]);
+            (r.t_s[i], squares.sum::<f64>().sqrt())
+        })
+        .collect();
+    let begin = rows.first()?.0;
+    let steady = energy_off_s - STEADY_SHARE * (energy_off_s - begin);
+    let middle = 0.5 * (energy_off_s + rows.last()?.0);
+    let usual =
+        |values: Vec<f64>| (!values.is_empty()).then(|| crate::estimation::statistics::median(&mut values.clone()));
+    let within = |from: f64, to: f64| rows.iter().enumerate().filter(move |(_, (t, _))| *t > from && *t < to);
+    let per_amplitude = |command: &[f64], from: f64, to: f64| {
+        let all = within(from, to).map(|(i, (_, a))| command[settled.start + i] / a);
+        usual(all.filter(|v| v.is_finite()).collect())
+    };
+    let amplitude =
+        |from: f64, to: f64| usual(within(from, to).map(|(_, (_, a))| *a).filter(|a| a.is_finite()).collect());
+    let v_as = r.vas_v.as_deref()?;
+    let on = per_amplitude(v_as, steady, energy_off_s)?;
+    let halves = [(energy_off_s, middle), (middle, f64::INFINITY)];
+    let [first, last] = halves.map(|(from, to)| per_amplitude(v_as, from, to));
+    let (first, last) = (first?, last?);
+    let fell = 1.0 - amplitude(halves[1].0, halves[1].1)? / amplitude(steady, energy_off_s)?;
+    let same = [first, last].iter().all(|v| (v / on - 1.0).abs() < SAME_COMMAND);
+    if same && fell > 2.0 * SAME_COMMAND {
+        return Some(format!(
+            "vas_v per amplitude is {last:.4} while the amplitude decays, and was {on:.4} before: it is not what held the \
+             amplitude; vas_v and vqc_v exchanged?"
+        ));
+    }
+    let v_qc = r.vqc_v.as_deref()?;
+    let held = per_amplitude(v_qc, steady, energy_off_s)?;
+    let vanished = [per_amplitude(v_qc, halves[0].0, halves[0].1)?, per_amplitude(v_qc, halves[1].0, halves[1].1)?];
+    let instead = vanished.iter().all(|v| v.abs() < SAME_COMMAND * held.abs()) && last.abs() > 0.5 * on.abs();
+    instead.then(|| "vqc_v vanishes at energy_off_s, and vas_v does not: the two are exchanged".into())
 }
 
 /// Decay rate of an amplitude from its logarithm, 1/s, its standard error, and the intercept: weighted by the squared amplitude, since
