@@ -72,3 +72,29 @@ fn an_energy_command_that_is_recorded_but_does_not_act_is_no_fault() {
         assert!(holds(&ratio, RATIO), "{ratio:?}");
     }
 }
+
+/// Another instrument's damping, or another's drives: the ratio of its gain and this one's is nobody's.
+#[test]
+fn a_ring_down_of_another_device_is_named_and_left_out() {
+    for (tau_s, file) in [(30.0, "ringdown-90.csv"), (19.0, "ringdown-90.csv"), (12.0, "ringdown-0.csv")] {
+        let mut campaign = recorded(settings());
+        let mut other = recorded(Settings { tau_s, seed: 77, ..settings() });
+        let is_it = |r: &&mut Recorded| r.file.ends_with(file);
+        *ring_downs(&mut campaign).into_iter().find(is_it).unwrap() =
+            ring_downs(&mut other).into_iter().find(is_it).unwrap().clone();
+        let report = identified(campaign).unwrap().report;
+        let told = |w: &String| w.contains(file) && w.contains("another device");
+        assert!(report.warnings.iter().any(told), "{tau_s} s: {:?}", report.warnings);
+        let run = |name: &str| report.runs.iter().find(|r| r.file.ends_with(name)).unwrap();
+        assert_eq!(run(file).agrees, Some(false));
+        assert!(report.actuation_gain_ratio.is_none_or(|e| holds(&e, RATIO)), "{:?}", report.actuation_gain_ratio);
+        assert!((report.detection_gain_ratio.unwrap().value - 1.0132).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn sound_ring_downs_are_kept_whatever_the_anisodamping() {
+    let report = identified(recorded(settings())).unwrap().report;
+    assert!(report.runs.iter().all(|r| r.r#use != "left out"), "{:?}", report.warnings);
+    assert!(holds(&report.actuation_gain_ratio.unwrap(), RATIO));
+}

@@ -19,6 +19,7 @@ use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
+use crate::estimation::ring_down_agreement::Anisodamping;
 use crate::free_decay;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::{Campaign, Reference, Role, RunKind};
@@ -159,10 +160,14 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     dataset.written.clone_from(&options.effects);
     (options.progress)("fitting the declared model");
     let paper = declared_hypothesis(&dataset.start);
+    dataset.without_foreign_ring_downs(&paper, Anisodamping::Open)?;
     let declared = fit_with_ring_downs(&mut dataset, &paper)?;
     let declared_fit = declared.fit.clone();
     let (mut fitted, mut steps) =
         if options.discover { discover(&mut dataset, declared, options.progress)? } else { (declared, Vec::new()) };
+    if dataset.without_foreign_ring_downs(&fitted.fit.hypothesis, Anisodamping::Fitted)? {
+        fitted = fit_with_ring_downs(&mut dataset, &fitted.fit.hypothesis)?;
+    }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
     let scale_factor = scale_factor(&gains(&mut dataset, &fitted));
@@ -392,7 +397,14 @@ impl Found {
                 _ => "holdout".into(),
             };
         }
-        for (run, r) in runs.iter_mut().filter(|r| r.kind == "ringdown").zip(&self.fitted.ring_downs) {
+        let (foreign, own): (Vec<_>, Vec<_>) = runs
+            .iter_mut()
+            .filter(|r| r.kind == "ringdown")
+            .partition(|r| self.dataset.ring_downs_left_out.contains(&r.file));
+        for run in foreign {
+            (run.r#use, run.agrees) = ("left out".into(), Some(false));
+        }
+        for (run, r) in own.into_iter().zip(&self.fitted.ring_downs) {
             run.tau_s = Some(Estimate::new(r.tau_s, r.tau_error_s));
         }
         runs

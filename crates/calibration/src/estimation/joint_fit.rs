@@ -48,6 +48,8 @@ pub(crate) struct Dataset {
     pub(crate) tracks: Vec<Prepared>,
     pub(crate) start: Hypothesis,
     pub(crate) ring_down_runs: Vec<crate::recording::Run>,
+    /// files of those that are of another instrument
+    pub(crate) ring_downs_left_out: Vec<String>,
     pub(crate) warnings: Vec<String>,
     /// effects as text, which compete with the library's
     pub(crate) written: Vec<EffectId>,
@@ -122,6 +124,7 @@ impl Dataset {
             tracks: prepared,
             start,
             ring_down_runs,
+            ring_downs_left_out: Vec::new(),
             warnings,
             written: Vec::new(),
             energy_balance: None,

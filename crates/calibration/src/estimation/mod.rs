@@ -15,6 +15,7 @@ pub(crate) mod normal;
 pub(crate) mod propagation;
 pub(crate) mod residuals;
 pub(crate) mod restricted_likelihood;
+pub(crate) mod ring_down_agreement;
 pub(crate) mod screening;
 pub(crate) mod simplex;
 pub(crate) mod statistics;

@@ -1,0 +1,140 @@
+//! Whether the ring-downs are of the instrument that turns in the rotation runs.
+//!
+//! In every direction the drive replaces the damping, $$G(θ)\\,d(θ) = 1/τ(θ),\\quad d = -v_{as}/a,\\quad 1/τ(θ) = 1/τ +
+//! ½Δ(1/τ)\\cos 2(θ-θ_τ)$$ A pattern that turns takes the mean of d over all directions; a ring-down takes d of one, which
+//! differs from it by what the gains differ and by the anisodamping, that the angle tells. Another resonator takes another.
+
+use cvg_model::effects::EffectId;
+
+use crate::error::Refusal;
+use crate::estimation::actuation::{RingDown, ring_down};
+use crate::estimation::joint_fit::Dataset;
+use crate::estimation::statistics::median;
+use crate::model::hypothesis::Hypothesis;
+use crate::recording::{Role, Run};
+
+/// A ring-down takes no drive that differs by a larger share than this from what the rotations take: gains of the axes that
+/// differ by a fifth, and as much of the damping, make less.
+const LARGEST_SHARE: f64 = 0.25;
+/// Once the anisodamping is known, dampings of ring-downs agree within this share, or within so many deviations.
+const SAME_DAMPING: f64 = 0.05;
+const DEVIATIONS: f64 = 6.0;
+/// Runs that differ in temperature by more than this differ in their damping.
+const SAME_TEMPERATURE_K: f64 = 5.0;
+/// Samples of a run that tell how strongly it was driven.
+const LOOKED_AT: usize = 2000;
+
+/// What is known of the anisodamping when ring-downs are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Anisodamping {
+    /// nothing yet: only what no anisotropy makes is odd
+    Open,
+    /// as the hypothesis has it
+    Fitted,
+}
+
+impl Dataset {
+    /// Leaves out ring-downs that are of another instrument than the rotations, or of another than each other, by name;
+    /// whether there were any.
+    ///
+    /// # Errors
+    /// Where a ring-down is not one.
+    pub(crate) fn without_foreign_ring_downs(
+        &mut self,
+        hypothesis: &Hypothesis,
+        known: Anisodamping,
+    ) -> Result<bool, Refusal> {
+        let all = self.ring_down_runs.iter().map(|r| ring_down(r, hypothesis)).collect::<Result<Vec<_>, _>>()?;
+        let usual = self.usual_drive(hypothesis);
+        let mut odd: Vec<(usize, String)> = Vec::new();
+        for (at, r) in all.iter().enumerate() {
+            let Some(share) = usual.map(|usual| -r.drive / usual - 1.0).filter(|s| s.abs() > LARGEST_SHARE) else {
+                continue;
+            };
+            if !self.differs_in_temperature(&self.ring_down_runs[at]) {
+                odd.push((
+                    at,
+                    format!(
+                        "it takes {:.1} % {} energy command per amplitude than the rotations",
+                        100.0 * share.abs(),
+                        if share > 0.0 { "more" } else { "less" }
+                    ),
+                ));
+            }
+        }
+        if odd.is_empty() && known == Anisodamping::Fitted && self.tracks_differ() {
+            odd = contradictions(&all, hypothesis, usual);
+        }
+        for (at, why) in odd.iter().rev() {
+            let name = crate::data::track::run_name(&self.ring_down_runs[*at]);
+            self.warnings.push(format!("{name}: left out: {why}: a ring-down of another device?"));
+            let run = self.ring_down_runs.remove(*at);
+            self.ring_downs_left_out.push(run.file.display().to_string());
+        }
+        Ok(!odd.is_empty())
+    }
+
+    /// The mean of −v_as/a over the directions, 1/1, of the usual rotation; `None` where it was not recorded.
+    fn usual_drive(&self, hypothesis: &Hypothesis) -> Option<f64> {
+        let fitted = self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0);
+        let means = fitted.filter(|t| t.has_commands() && t.has_amplitude()).filter_map(|t| {
+            let stride = (t.t_s.len() / LOOKED_AT).max(1);
+            let rows = t.segments.iter().flat_map(|s| s.range.clone()).step_by(stride);
+            let taken = rows.filter_map(|i| {
+                let a = hypothesis.unread(t.envelope(i), &t.moment(i, 0.0)).pendulum().e.sqrt();
+                t.commands(i, stride).map(|v| -v.now.v_as / a).filter(|d| d.is_finite())
+            });
+            let (sum, n) = taken.fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
+            (n > 0.0).then(|| sum / n)
+        });
+        let mut means: Vec<f64> = means.collect();
+        (!means.is_empty()).then(|| median(&mut means)).filter(|d| *d > 0.0)
+    }
+
+    fn differs_in_temperature(&self, run: &Run) -> bool {
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, n) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
+            (n > 0.0).then(|| sum / n)
+        };
+        let here = run.recording.temp_c.as_ref().and_then(|t| mean(&mut t.iter().copied()));
+        let there = mean(&mut self.tracks.iter().flat_map(|p| p.track.temperatures_c()));
+        here.zip(there).is_some_and(|(a, b)| (a - b).abs() > SAME_TEMPERATURE_K)
+    }
+}
+
+/// Ring-downs whose damping, less the anisodamping, is not that of the others. Of two, the one that takes another drive than
+/// the rotations is odd; where nothing tells, both are.
+fn contradictions(all: &[RingDown], hypothesis: &Hypothesis, usual: Option<f64>) -> Vec<(usize, String)> {
+    let [cos, sin] = hypothesis.member(EffectId::Anisodamping).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
+    let own = |r: &RingDown| 0.5 * (cos * (2.0 * r.angle_rad).cos() + sin * (2.0 * r.angle_rad).sin());
+    let damping: Vec<f64> = all.iter().map(|r| 1.0 / r.tau_s - own(r)).collect();
+    let deviation = |r: &RingDown| r.tau_error_s / (r.tau_s * r.tau_s);
+    let agree = |a: usize, b: usize| {
+        let within = DEVIATIONS * deviation(&all[a]).hypot(deviation(&all[b]));
+        (damping[a] - damping[b]).abs() <= within.max(SAME_DAMPING * 0.5 * (damping[a] + damping[b]))
+    };
+    let friends = |a: usize| (0..all.len()).filter(|b| agree(a, *b)).count();
+    let most = (0..all.len()).map(friends).max().unwrap_or(0);
+    let mut odd: Vec<usize> = (0..all.len()).filter(|a| friends(*a) < most).collect();
+    let off = |a: usize| usual.map(|usual| (-all[a].drive * (1.0 - own(&all[a]) * all[a].tau_s) / usual).ln().abs());
+    if odd.is_empty() && most < all.len() {
+        odd = (0..all.len()).collect();
+        let nearest = odd.iter().copied().filter_map(|a| off(a).map(|o| (a, o))).min_by(|a, b| a.1.total_cmp(&b.1));
+        // by less than this it is not told from the gains
+        if let Some((nearest, _)) = nearest.filter(|(_, off)| *off < SAME_DAMPING) {
+            odd.retain(|a| *a != nearest && !agree(*a, nearest));
+        }
+    }
+    let told = |a: &usize| {
+        let of: Vec<String> =
+            all.iter().map(|r| format!("{:.3} s at {:.0}°", r.tau_s, r.angle_rad.to_degrees())).collect();
+        (
+            *a,
+            format!(
+                "the ring-downs decay in {}, which is not what the anisodamping makes of one damping",
+                of.join(" and ")
+            ),
+        )
+    };
+    odd.iter().map(told).collect()
+}
