@@ -586,3 +586,24 @@ fn a_recording_of_another_sensor_or_with_exchanged_channels_is_not_compensated()
         assert!(refused(turned(by, sound())).contains("times as far as its reference"));
     }
 }
+
+/// A table that is zeroed while it turns, an encoder that loses counts, an integral that is begun anew.
+#[test]
+fn a_jump_in_a_run_of_a_rate_gyroscope_is_named_and_left_out() {
+    let rates = [90.0, -90.0, 90.0, -90.0];
+    let jumped = |column: fn(&mut Recording) -> &mut Option<Vec<f64>>, by: f64| {
+        let mut runs = vec![turned_at("a.csv", &rates, 0.1, 1), turned_at("b.csv", &[60.0; 4], 0.1, 2)];
+        column(&mut runs[1].recording).as_mut().unwrap()[2000..].iter_mut().for_each(|v| *v += by);
+        turned(runs).unwrap().report
+    };
+    let table: fn(&mut Recording) -> &mut Option<Vec<f64>> = |r| &mut r.table_deg;
+    let theta: fn(&mut Recording) -> &mut Option<Vec<f64>> = |r| &mut r.theta_deg;
+    for (column, name, by) in [(table, "table_deg", 117.0), (table, "table_deg", -3.0), (theta, "theta_deg", 40.0)] {
+        let report = jumped(column, by);
+        let k = report.angular_gain;
+        assert!((k.value + 0.98).abs() < 1e-3, "{by} in {name}: {k:?}, {:?}", report.warnings);
+        let said = format!("b.csv: {name} jumps by {by:.1}");
+        let is_said = |w: &String| w.starts_with(&said) && w.contains("row 2001");
+        assert!(report.warnings.iter().any(is_said), "{said}: {:?}", report.warnings);
+    }
+}

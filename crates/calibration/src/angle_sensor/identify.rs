@@ -3,6 +3,7 @@
 
 use super::deviations::{deviations, own_gain_ratios};
 use super::effects::Described;
+use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, Term};
 use super::report::{Errors, Finding, Head, report};
@@ -49,7 +50,11 @@ const ENOUGH_ROWS: usize = 3000;
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
-pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+pub(crate) fn identify(
+    mut campaign: Campaign,
+    options: &Options<'_>,
+    with_plots: bool,
+) -> Result<Identification, Refusal> {
     let rate_gyroscope = is_rate_gyroscope(&campaign);
     let instrument = campaign.instrument;
     let stated = match campaign.pole_pairs {
@@ -61,6 +66,9 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let head = Head::of(&campaign);
     (options.progress)("preparing the runs");
     let mut left_out = Vec::new();
+    if rate_gyroscope {
+        campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
+    }
     let mut runs = prepare(campaign, &mut left_out)?;
     if !rate_gyroscope {
         runs = believed(runs, stated, period, &mut left_out)?;

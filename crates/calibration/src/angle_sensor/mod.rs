@@ -7,6 +7,7 @@ mod deviations;
 mod effects;
 mod ellipse;
 mod identify;
+mod jumps;
 pub(crate) mod likeness;
 mod lines;
 pub(crate) mod model;

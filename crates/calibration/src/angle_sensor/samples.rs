@@ -202,7 +202,7 @@ pub(crate) fn span(values: &[f64]) -> f64 {
 }
 
 /// ∫ rate dt by the trapezoidal rule, rad, from rates in deg/s.
-fn integrated(t_s: &[f64], rate_dps: &[f64]) -> Vec<f64> {
+pub(crate) fn integrated(t_s: &[f64], rate_dps: &[f64]) -> Vec<f64> {
     let mut angle = 0.0;
     (0..t_s.len())
         .map(|i| {

@@ -1,0 +1,69 @@
+//! Where the angle of a rate gyroscope and its reference part from one row to the next and stay apart: a table that was
+//! zeroed, an encoder that lost counts, an integral that was begun anew. No rate is behind it, and no scale factor either.
+
+use std::f64::consts::TAU;
+
+use super::samples::{integrated, unwrapped};
+use crate::data::slips::slips;
+use crate::estimation::statistics::median;
+use crate::recording::Run;
+
+/// Parts of a run whose increments tell how far the angle goes with the reference.
+const PARTS: usize = 50;
+/// Rows on either side of a jump that tell how far a step usually goes.
+const BESIDE: usize = 12;
+
+/// Takes the jumps out of a run, from the column that jumps, and says so.
+pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
+    let Ok(settled) = run.settled() else { return Vec::new() };
+    let r = &mut run.recording;
+    let Some(theta) = r.theta_deg.as_ref().map(|v| radians(&v[settled.clone()], period)) else { return Vec::new() };
+    let reference = match (&r.table_deg, &r.rate_dps) {
+        (Some(table), _) => radians(&table[settled.clone()], TAU),
+        (None, Some(rate)) => integrated(&r.t_s[settled.clone()], &rate[settled.clone()]),
+        (None, None) => return Vec::new(),
+    };
+    let Some(gain) = gain(&theta, &reference) else { return Vec::new() };
+    let expected: Vec<f64> = reference.iter().map(|a| gain * a).collect();
+    let mut said = Vec::new();
+    for slip in slips(&theta, &expected, period) {
+        let row = settled.start + slip.at;
+        let is_table = r.table_deg.is_some() && unusual(&expected, slip.at) > unusual(&theta, slip.at);
+        let (column, name, by) = match (&mut r.table_deg, &mut r.theta_deg) {
+            (Some(table), _) if is_table => (table, "table_deg", -slip.by / gain),
+            (_, Some(theta)) => (theta, "theta_deg", slip.by),
+            _ => continue,
+        };
+        column[row..].iter_mut().for_each(|v| *v -= by.to_degrees());
+        said.push(format!(
+            "{}: {name} jumps by {:.3}° from row {row} to row {}, at {:.3} s, and nothing turned by that; the jump is left out",
+            run.file.display(),
+            by.to_degrees(),
+            row + 1,
+            r.t_s[row]
+        ));
+    }
+    said
+}
+
+fn radians(degrees: &[f64], period: f64) -> Vec<f64> {
+    unwrapped(degrees.iter().map(|d| d.to_radians()), period)
+}
+
+/// How far the angle goes with the reference: the median over parts of the run, of which a jump is in few.
+fn gain(theta: &[f64], reference: &[f64]) -> Option<f64> {
+    let width = (theta.len() / PARTS).max(1);
+    let increments = |v: &[f64]| (width..v.len()).map(|i| v[i] - v[i - width]).collect::<Vec<f64>>();
+    let (theta, reference) = (increments(theta), increments(reference));
+    let usual = median(&mut reference.iter().map(|d| d.abs()).collect::<Vec<_>>());
+    let mut ratios: Vec<f64> =
+        theta.iter().zip(&reference).filter(|(_, d)| d.abs() >= usual && **d != 0.0).map(|(t, d)| t / d).collect();
+    (!ratios.is_empty()).then(|| median(&mut ratios)).filter(|g| g.is_finite() && *g != 0.0)
+}
+
+/// By how much the step into row `at` differs from those beside it.
+fn unusual(angle: &[f64], at: usize) -> f64 {
+    let beside = at.saturating_sub(BESIDE).max(1)..(at + BESIDE).min(angle.len());
+    let step = |i: usize| angle[i] - angle[i - 1];
+    (step(at) - median(&mut beside.map(step).collect::<Vec<_>>())).abs()
+}
