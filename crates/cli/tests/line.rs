@@ -276,6 +276,39 @@ fn motion_at_rest_is_left_out_and_named_and_a_run_that_moves_is_no_answer() {
     assert!(walking.stderr.contains("rest.csv") && walking.stderr.contains("moves"), "{}", walking.stderr);
 }
 
+/// A table that sways, or that turns: what is smooth from row to row is motion, however the rows scatter.
+#[test]
+fn a_run_at_rest_that_moves_all_the_time_is_not_read_as_noise() {
+    let folder = TempDir::new().unwrap();
+    let moved = |by: &dyn Fn(f64) -> f64| {
+        let text = at_rest(20_000, 1, false);
+        let mut lines = text.lines();
+        let mut out = format!("{}\n", lines.next().unwrap());
+        for line in lines {
+            let (t, theta) = line.split_once(',').unwrap();
+            let moved = theta.parse::<f64>().unwrap() + by(t.parse().unwrap());
+            let _ = writeln!(out, "{t},{}", moved.rem_euclid(180.0));
+        }
+        static_campaign(folder.path(), &[("rest.csv", out)])
+    };
+    for by in [&|t: f64| 3.0 * (0.7 * t).sin() as f64, &|t: f64| 45.0 * t] as [&dyn Fn(f64) -> f64; 2] {
+        let outcome = run(&[&"identify", &moved(by)]);
+        assert_eq!(outcome.status, 1, "{}", outcome.stdout);
+        assert!(
+            outcome.stderr.contains("rest.csv") && outcome.stderr.contains("kind = \"rotation\""),
+            "{}",
+            outcome.stderr
+        );
+    }
+    let slow = report(&moved(&|t| 0.5 * (0.3 * t).sin()));
+    assert!(slow["allan"]["angle_random_walk_deg_sqrt_h"].is_null(), "{}", slow["allan"]);
+    assert!(slow["warnings"].to_string().contains("rest.csv: the instrument moves throughout"), "{}", slow["warnings"]);
+    // a bias is no motion, and drifts slowly
+    let still = report(&moved(&|t| 0.01 * t + 1e-6 * t * t));
+    assert!(still["allan"]["angle_random_walk_deg_sqrt_h"].is_object(), "{}", still["allan"]);
+    assert!(!still["warnings"].to_string().contains("moves"), "{}", still["warnings"]);
+}
+
 #[test]
 fn a_run_at_rest_that_is_too_short_is_no_answer() {
     let folder = TempDir::new().unwrap();

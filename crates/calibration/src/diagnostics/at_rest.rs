@@ -25,6 +25,16 @@ const FASTEST_DPS: f64 = 0.5;
 const OVER: [usize; 2] = [1, 8];
 /// Share of a run's rows that may be motion.
 const MOST_MOVING: f64 = 0.1;
+/// Mean rates at consecutive intervals that go together so closely are no noise; looked at for intervals of up to so many
+/// seconds, with so many of them.
+const GOES_ON: f64 = 0.5;
+const LOOKED_AT_S: f64 = 4.0;
+const FEWEST_INTERVALS: usize = 64;
+const DEVIATIONS: f64 = 4.0;
+/// A rate that goes on and changes by so much, deg/s, is not told from a bias that does.
+const SLOWEST_DPS: f64 = 0.05;
+/// No bias is as large as this, deg/s.
+const LARGEST_DPS: f64 = 20.0;
 
 /// A run at rest as stretches without a gap.
 struct AtRest {
@@ -56,7 +66,11 @@ pub(crate) fn allan(
     let period = period_deg.unwrap_or(if instrument == Instrument::Sensor { 360.0 } else { 180.0 });
     let mut rests: Vec<AtRest> = runs.par_iter().map(|r| AtRest::new(r, period)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
+    let mut drifts = false;
     for rest in &mut rests {
+        let drift = rest.drift()?;
+        drifts |= drift.is_some();
+        warnings.extend(drift);
         warnings.extend(rest.without_motion()?);
     }
     let Some(longest) = rests.iter().max_by(|a, b| a.length_s.total_cmp(&b.length_s)) else {
@@ -78,7 +92,7 @@ pub(crate) fn allan(
     let octaves: Vec<usize> = std::iter::successors(Some(1usize), |m| Some(2 * m))
         .take_while(|m| points.last().is_some_and(|p| *m as f64 * interval_s <= p.tau_s))
         .collect();
-    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves));
+    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves)).filter(|_| !drifts);
     let (bottom, at_the_end) = bottom(&points).ok_or_else(|| {
         Refusal::no_answer(&longest.name, "the angle at rest does not change at all", "an angle with all its digits")
     })?;
@@ -89,7 +103,7 @@ pub(crate) fn allan(
             bottom.tau_s
         ));
     }
-    if walk.is_none() {
+    if walk.is_none() && !drifts {
         warnings.push("angle_random_walk_deg_sqrt_h is null: no stretch of the Allan deviation falls as 1/√τ".into());
     }
     let hour = 3600.0;
@@ -159,6 +173,55 @@ impl AtRest {
         }
         let length_s = t_s[t_s.len() - 1] - t_s[0];
         Ok(Self { name, interval_s, stretches, rate_dps: line(t_s, &followed).0, length_s })
+    }
+
+    /// Says that the rate goes on and changes throughout, where it does: that is no noise.
+    ///
+    /// # Errors
+    /// Where it is faster than a bias ever changes by, or is.
+    fn drift(&self) -> Result<Option<String>, Refusal> {
+        let wanted = "a run at rest, or kind = \"rotation\" with what turned it";
+        if self.rate_dps.abs() > LARGEST_DPS {
+            return Err(Refusal::no_answer(
+                &self.name,
+                format!("its angle turns at {:.1} deg/s", self.rate_dps),
+                wanted,
+            ));
+        }
+        let rates = std::iter::successors(Some(1usize), |m| Some(2 * m))
+            .take_while(|m| *m == 1 || *m as f64 * self.interval_s <= LOOKED_AT_S)
+            .filter_map(|m| self.rate_that_goes_on(m));
+        let Some(rate) = rates.max_by(f64::total_cmp).filter(|r| *r > SLOWEST_DPS) else { return Ok(None) };
+        let what = format!("the instrument moves throughout: its rate goes on and changes by {rate:.2} deg/s rms");
+        if rate > FASTEST_DPS {
+            return Err(Refusal::no_answer(&self.name, what, wanted));
+        }
+        Ok(Some(format!(
+            "{}: {what}; that is motion or drift and no noise, and angle_random_walk_deg_sqrt_h is null",
+            self.name
+        )))
+    }
+
+    /// rms of the mean rates over intervals of so many samples, about their mean, deg/s, where each goes with the next.
+    fn rate_that_goes_on(&self, samples: usize) -> Option<f64> {
+        let over_s = samples as f64 * self.interval_s;
+        let rates: Vec<Vec<f64>> = self
+            .stretches
+            .iter()
+            .map(|s| s.iter().step_by(samples).collect::<Vec<_>>().windows(2).map(|w| (w[1] - w[0]) / over_s).collect())
+            .collect();
+        let n = rates.iter().map(Vec::len).sum::<usize>();
+        if n < FEWEST_INTERVALS {
+            return None;
+        }
+        // few that move are left out by themselves
+        let middle = median(&mut rates.iter().flatten().copied().collect::<Vec<_>>());
+        let usual = robust_deviation(rates.iter().flatten().map(|r| r - middle));
+        let kept = |r: f64| (r - middle).clamp(-DEVIATIONS * usual, DEVIATIONS * usual);
+        let square = rates.iter().flatten().map(|r| kept(*r).powi(2)).sum::<f64>() / n as f64;
+        let pairs = || rates.iter().flat_map(|r| r.windows(2));
+        let product = pairs().map(|w| kept(w[0]) * kept(w[1])).sum::<f64>() / pairs().count().max(1) as f64;
+        (product > GOES_ON * square).then(|| square.sqrt())
     }
 
     /// Leaves out rows in which the instrument moves, each as a gap; says so.
