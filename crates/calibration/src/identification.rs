@@ -261,7 +261,7 @@ impl Found {
         let inference = Inference { dataset, fitted, covariance: &self.covariance };
         let own_ratios = self.context(&[]).own_detection_ratios();
         let detection_gain_ratio = inference.detection_ratio(&own_ratios, &mut warnings);
-        let actuation_gain_ratio = inference.actuation_ratio(&mut warnings);
+        let actuation_gain_ratio = inference.actuation_ratio(detection_gain_ratio, &mut warnings);
         let effects = inference.effects(&self.steps, &errors.discovered);
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);

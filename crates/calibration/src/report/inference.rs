@@ -5,6 +5,7 @@ use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stag
 use nalgebra::DMatrix;
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::estimation::actuation::{DriveGains, ring_down};
 use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Dataset, Fitted};
@@ -28,6 +29,8 @@ pub(crate) struct Inference<'a> {
     pub(crate) covariance: &'a DMatrix<f64>,
 }
 
+/// A step of a readout's unknown that the ring-downs still answer in proportion to.
+const LARGEST_STEP: f64 = 1e-3;
 /// What a run says by itself contradicts all runs beyond this many of its standard deviations.
 pub(crate) const CONTRADICTS: f64 = 6.0;
 /// A drift that contradicts what is believed of drifts, in standard deviations of that: 1 in 100.
@@ -149,7 +152,7 @@ impl Inference<'_> {
     }
 
     /// G_Ax/G_Ay, where the campaign identifies it.
-    pub(crate) fn actuation_ratio(&self, warnings: &mut Vec<String>) -> Option<Estimate> {
+    pub(crate) fn actuation_ratio(&self, detection: Option<Estimate>, warnings: &mut Vec<String>) -> Option<Estimate> {
         if self.dataset.instrument == Instrument::Sensor {
             warnings.push("a sensor has no drive: there is no actuation gain ratio".into());
             return None;
@@ -159,6 +162,7 @@ impl Inference<'_> {
             .filter(|u| self.is_identified(*u, &EffectId::ActuationGainMismatch.description().parameters[0]))
             .map(|u| self.estimate(u))
             .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
+            .map(|e| self.with_the_readouts_share(e, detection))
             .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
         match (&identified, &self.fitted.drive) {
             (None, _) => warnings.push(
@@ -180,6 +184,41 @@ impl Inference<'_> {
             }
         }
         identified
+    }
+
+    /// An actuation gain ratio with an interval that also covers what the readout's unknowns make of the ring-downs: the drive
+    /// is told per amplitude, and the amplitudes of both axes are known as well as the gains of the detection are.
+    fn with_the_readouts_share(&self, ratio: Estimate, detection: Option<Estimate>) -> Estimate {
+        let told = |h: &Hypothesis| {
+            let runs = self.dataset.ring_down_runs.iter().map(|r| ring_down(r, h));
+            let all = runs.collect::<Result<Vec<_>, _>>().ok()?;
+            DriveGains::from_ring_downs(&all).map(|d| d.ratio().ln())
+        };
+        let Some(nominal) = self.fitted.drive.as_ref().and_then(|_| told(self.hypothesis())) else { return ratio };
+        let unknowns = self.fitted.fit.unknowns.iter().enumerate();
+        let readout = unknowns.filter(|(_, u)| {
+            matches!(u, Unknown::Effect(at, _)
+                if self.hypothesis().members[*at].id.description().stage == Stage::Readout)
+        });
+        // where one stands in the covariance, and what a unit of it makes of the ratio's logarithm
+        let slopes: Vec<(usize, Unknown, f64)> = readout
+            .filter_map(|(i, u)| {
+                let step = self.deviation(*u).min(LARGEST_STEP);
+                let mut moved = self.hypothesis().clone();
+                moved.set(*u, moved.get(*u) + step);
+                let slope = (told(&moved)? - nominal) / step;
+                slope.is_finite().then_some((i, *u, slope))
+            })
+            .collect();
+        let pairs = slopes.iter().flat_map(|a| slopes.iter().map(move |b| (a, b)));
+        let fitted: f64 = pairs.map(|((i, _, a), (j, _, b))| a * b * self.covariance[(*i, *j)]).sum();
+        // the detection ratio's own interval may cover more than its deviation
+        let gain = self.first(EffectId::DetectionGainMismatch);
+        let wider = slopes.iter().find(|(_, u, _)| Some(*u) == gain).zip(detection).map_or(0.0, |((i, _, a), e)| {
+            a * a * ((e.half_width() / 1.96).powi(2) - self.covariance[(*i, *i)]).max(0.0)
+        });
+        let share = 1.96 * ratio.value.abs() * (fitted + wider).max(0.0).sqrt();
+        ratio.widened(ratio.half_width().hypot(share) - ratio.half_width())
     }
 
     /// The deviation of a parameter is well below what was believed of it without data.
