@@ -124,3 +124,14 @@ fn the_interval_of_the_actuation_ratio_covers_what_the_detection_ratio_is_unknow
     // of 16 intervals of 95 % one in a thousand campaigns of campaigns misses four
     assert!(told.iter().filter(|t| t.1).count() >= 13, "{told:?}");
 }
+
+/// What the rotations call the energy command is the quadrature's, whose mean is nothing.
+#[test]
+fn energy_and_quadrature_command_exchanged_in_the_rotations_are_no_answer() {
+    let mut campaign = recorded(settings());
+    for run in campaign.runs.iter_mut().filter(|r| r.kind == RunKind::Rotation) {
+        std::mem::swap(&mut run.recording.vas_v, &mut run.recording.vqc_v);
+    }
+    let refused = identified(campaign).unwrap_err().to_string();
+    assert!(refused.contains("vas_v and vqc_v in their places"), "{refused}");
+}

@@ -16,6 +16,8 @@ use crate::recording::{Role, Run};
 /// A ring-down takes no drive that differs by a larger share than this from what the rotations take: gains of the axes that
 /// differ by a fifth, and as much of the damping, make less.
 const LARGEST_SHARE: f64 = 0.25;
+/// Rotations that take less than this share of what every ring-down takes hold no amplitude by it.
+const LEAST_DRIVE: f64 = 0.2;
 /// Once the anisodamping is known, dampings of ring-downs agree within this share, or within so many deviations.
 const SAME_DAMPING: f64 = 0.05;
 const DEVIATIONS: f64 = 6.0;
@@ -38,7 +40,7 @@ impl Dataset {
     /// whether there were any.
     ///
     /// # Errors
-    /// Where a ring-down is not one.
+    /// Where a ring-down is not one, or what the rotations take replaces no damping at all.
     pub(crate) fn without_foreign_ring_downs(
         &mut self,
         hypothesis: &Hypothesis,
@@ -46,6 +48,21 @@ impl Dataset {
     ) -> Result<bool, Refusal> {
         let all = self.ring_down_runs.iter().map(|r| ring_down(r, hypothesis)).collect::<Result<Vec<_>, _>>()?;
         let usual = self.usual_drive(hypothesis);
+        if let Some(usual) =
+            usual.filter(|usual| !all.is_empty() && all.iter().all(|r| *usual < LEAST_DRIVE * -r.drive))
+        {
+            return Err(Refusal::no_answer(
+                all.first().map_or("campaign", |r| r.name.as_str()),
+                format!(
+                    "the ring-downs take an energy command of {:.4} per amplitude, the rotations {:.4} in the mean: that does \
+                     not replace one damping",
+                    all.first().map_or(0.0, |r| r.drive),
+                    -usual
+                ),
+                "vas_v and vqc_v in their places in the rotations, in one unit, and ring-downs of the same device",
+            ));
+        }
+        let usual = usual.filter(|d| *d > 0.0);
         let mut odd: Vec<(usize, String)> = Vec::new();
         for (at, r) in all.iter().enumerate() {
             let Some(share) = usual.map(|usual| -r.drive / usual - 1.0).filter(|s| s.abs() > LARGEST_SHARE) else {
@@ -88,7 +105,7 @@ impl Dataset {
             (n > 0.0).then(|| sum / n)
         });
         let mut means: Vec<f64> = means.collect();
-        (!means.is_empty()).then(|| median(&mut means)).filter(|d| *d > 0.0)
+        (!means.is_empty()).then(|| median(&mut means))
     }
 
     fn differs_in_temperature(&self, run: &Run) -> bool {
