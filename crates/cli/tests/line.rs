@@ -291,7 +291,7 @@ fn a_run_at_rest_that_moves_all_the_time_is_not_read_as_noise() {
         }
         static_campaign(folder.path(), &[("rest.csv", out)])
     };
-    for by in [&|t: f64| 3.0 * (0.7 * t).sin() as f64, &|t: f64| 45.0 * t] as [&dyn Fn(f64) -> f64; 2] {
+    for by in [&|t: f64| 3.0 * f64::sin(0.7 * t), &|t: f64| 45.0 * t] as [&dyn Fn(f64) -> f64; 2] {
         let outcome = run(&[&"identify", &moved(by)]);
         assert_eq!(outcome.status, 1, "{}", outcome.stdout);
         assert!(
