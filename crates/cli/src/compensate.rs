@@ -75,6 +75,9 @@ fn one(calibration: &Calibration, file: &Path, out: &Path, inputs: &[PathBuf], n
         output::tell(format_args!("warning: {}: {outside}", file.display()));
     }
     let compensated = cvg_calibration::compensate(calibration, &recording)?;
+    for w in compensated.warnings.iter().skip(recording.warnings.len()) {
+        output::tell(format_args!("warning: {w}"));
+    }
     let mut bytes = Vec::new();
     if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
         compensated.write_parquet(&mut bytes)

@@ -2,6 +2,8 @@
 //! not: what tells is that the angle turns as far as the calibrated one and the same way, and that undoing the calibration
 //! does not make the angle, or the radius of a sensor without a reference, worse.
 
+use cvg_model::effects::EffectId;
+
 use crate::angle_sensor::{span, unwrapped};
 use crate::data::track::wrapped;
 use crate::error::Refusal;
@@ -32,6 +34,8 @@ const LEAST_TURN_RAD: f64 = 0.1;
 const SHARE: f64 = 0.1;
 /// … or what a drift may add to the angle, rad/s: 5 deg/s, as much as a rate gyroscope's bias may be.
 const LARGEST_DRIFT_RAD_S: f64 = 0.087;
+/// Offset and unequal gains of the calibrated sensor leave less than this share of its radius.
+const LARGEST_LEFT_IN_THE_RADIUS: f64 = 0.02;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
 
@@ -80,6 +84,29 @@ pub(crate) fn require_of_the_calibrated(
         }
     }
     Ok(())
+}
+
+/// What a sensor's radius still does with its angle although its readout is undone, in words; none where that is little.
+pub(crate) fn left_in_the_radius(h: &Hypothesis, rows: &[Row]) -> Option<String> {
+    let reads = |id: EffectId| matches!(id, EffectId::DetectionOffset | EffectId::DetectionGainMismatch);
+    let corrected = h.members.iter().any(|m| reads(m.id));
+    if h.instrument != Instrument::Sensor || !corrected || !goes_round(rows, h.period_rad) {
+        return None;
+    }
+    let usual = median(&mut rows.iter().map(|r| r.radius[1]).collect::<Vec<_>>());
+    let mut equations = NormalEquations::new(5);
+    for r in rows {
+        let ((s1, c1), (s2, c2)) = (r.angle_rad[1].sin_cos(), (2.0 * r.angle_rad[1]).sin_cos());
+        equations.add(&[1.0, c1, s1, c2, s2], r.radius[1] / usual);
+    }
+    let share = equations.solve()[1..].iter().fold(0.0, |sum: f64, a| sum.hypot(*a));
+    (share > LARGEST_LEFT_IN_THE_RADIUS).then(|| {
+        format!(
+            "with the calibration undone its radius still goes with its angle by {:.1} %: a recording of another sensor than \
+             the calibrated one, or that one has changed",
+            100.0 * share
+        )
+    })
 }
 
 /// Whether the reference turns, and the angle goes round once and more, or would.

@@ -9,7 +9,7 @@ use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
-use crate::report::belonging::{Row, require_of_the_calibrated};
+use crate::report::belonging::{Row, left_in_the_radius, require_of_the_calibrated};
 use crate::report::calibration::Calibration;
 use crate::report::provenance::amplitude;
 
@@ -37,7 +37,8 @@ const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3
 ///
 /// # Errors
 /// Where the recording has no angle, no reference though the calibration needs one, or another unit than the calibration, and
-/// where it is none of the calibrated instrument: its angle turns otherwise, or undoing the calibration makes it worse.
+/// where it is none of the calibrated instrument: its angle turns otherwise, or undoing the calibration makes it worse. What
+/// speaks for another sensor and does not prove it is a warning of the recording that is returned.
 pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Recording, Refusal> {
     let h = &portable(&calibration.hypothesis);
     same_unit(calibration, recording)?;
@@ -93,6 +94,9 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         });
     }
     require_of_the_calibrated(calibration, recording, &rows)?;
+    if let Some(left) = left_in_the_radius(h, &rows).filter(|_| channels) {
+        out.warnings.push(format!("{}: {left}", recording.source.display()));
+    }
     if channels && recording.theta_deg.is_none() {
         let mut last = angle_rad.first().copied().unwrap_or(0.0);
         out.theta_deg = Some(
