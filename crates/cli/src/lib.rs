@@ -62,18 +62,21 @@ pub fn run() -> ExitCode {
 /// Works with no more threads than the machine has processors, whatever the environment says, and does not repeat what a
 /// decoder says of a file that it panics at: the answer says it.
 pub(crate) fn keep_to_the_machine() {
-    let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok()).filter(|n| *n > 0);
     // where the system gives no threads, the library says so when it wants the first
-    let _ = rayon::ThreadPoolBuilder::new()
-        .num_threads(asked.map_or(processors, |n: usize| n.min(processors)))
-        .build_global();
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads()).build_global();
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         if !cvg_calibration::recording::panic_is_answer() {
             usual(panic);
         }
     }));
+}
+
+/// How many threads to work with.
+pub(crate) fn threads() -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok()).filter(|n| *n > 0);
+    asked.map_or(processors, |n: usize| n.min(processors))
 }
 
 fn done(command: Command) -> Result<(), Failure> {

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::{Campaign, Instrument, Naming, Recording, Values};
@@ -22,11 +23,43 @@ use crate::{Failure, compare, fleet, inspect, library, report};
 /// Columns of a recording by their names.
 pub type Columns = Vec<(String, Values)>;
 
-/// Prepares a process, the first time: no more threads than the machine has processors, and a damaged file is an error, not a
-/// message of a decoder. RAYON_NUM_THREADS is read then.
-pub fn prepare() {
-    static PREPARED: std::sync::Once = std::sync::Once::new();
-    PREPARED.call_once(crate::keep_to_the_machine);
+/// As much stack as the main thread of a program has.
+pub const STACK_BYTES: usize = 8 << 20;
+
+/// Does `work` in a process that is prepared the first time: no more threads than the machine has processors, and a damaged file
+/// is an error, not a message of a decoder. RAYON_NUM_THREADS is read then.
+///
+/// A process that was forked from a prepared one has the memory of its threads and none of the threads, for which it would wait
+/// for ever: it makes its own.
+///
+/// # Errors
+/// Where the system gives a forked process no threads.
+pub fn prepared<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    static PREPARED: OnceLock<u32> = OnceLock::new();
+    static FORKED: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
+    let this = std::process::id();
+    let first = *PREPARED.get_or_init(|| {
+        crate::keep_to_the_machine();
+        this
+    });
+    if first == this {
+        return Ok(work());
+    }
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    let own = match &*forked {
+        Some((process, threads)) if *process == this => Arc::clone(threads),
+        _ => {
+            let threads = rayon::ThreadPoolBuilder::new().num_threads(crate::threads()).stack_size(STACK_BYTES).build();
+            let threads = Arc::new(threads.map_err(|e| Failure::input(format!("no threads to work with: {e}")))?);
+            if let Some((_, gone)) = forked.replace((this, Arc::clone(&threads))) {
+                // those of the process before: to give them back is to wait for them
+                std::mem::forget(gone);
+            }
+            threads
+        }
+    };
+    drop(forked);
+    Ok(own.install(work))
 }
 
 /// What is said of a campaign beside its recordings.

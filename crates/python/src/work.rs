@@ -6,18 +6,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
+use cvg_cli::service::{STACK_BYTES, prepared};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 /// How often it is looked for a signal.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// As much as the main thread of a program has.
-const STACK_BYTES: usize = 8 << 20;
 
 /// What the worker says.
 enum Said<T> {
     Progress(String),
     Done(T),
+    Failed(String),
 }
 
 /// Why the worker stopped without an answer.
@@ -35,24 +35,30 @@ pub(crate) fn aside<T: Send + 'static>(
     let unwanted = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&unwanted);
     let thread = std::thread::Builder::new().name("cvg".into()).stack_size(STACK_BYTES).spawn(move || {
-        cvg_cli::service::prepare();
         let words = say.clone();
-        let progress = move |what: &str| {
-            if seen.load(Ordering::Relaxed) {
-                // no panic: nothing is printed, and all that was begun is given back
-                resume_unwind(Box::new(Interrupted));
-            }
-            let _ = words.send(Said::Progress(what.to_owned()));
+        let at_work = move || {
+            let progress = move |what: &str| {
+                if seen.load(Ordering::Relaxed) {
+                    // no panic: nothing is printed, and all that was begun is given back
+                    resume_unwind(Box::new(Interrupted));
+                }
+                let _ = words.send(Said::Progress(what.to_owned()));
+            };
+            work(&progress)
         };
-        if let Ok(done) = catch_unwind(AssertUnwindSafe(|| work(&progress))) {
-            let _ = say.send(Said::Done(done));
-        }
+        let _ = match catch_unwind(AssertUnwindSafe(|| prepared(at_work))) {
+            Ok(Ok(done)) => say.send(Said::Done(done)),
+            Ok(Err(failure)) => say.send(Said::Failed(failure.to_string())),
+            // interrupted, or a fault of our own, which the end of the channel tells
+            Err(_) => Ok(()),
+        };
     })?;
     let answer = loop {
         let (said, back) = py.detach(move || next(heard));
         heard = back;
         let step = match said {
             Ok(Said::Done(done)) => break Ok(done),
+            Ok(Said::Failed(why)) => break Err(PyRuntimeError::new_err(why)),
             Ok(Said::Progress(what)) => progress.map_or(Ok(()), |p| p.call1((what,)).map(|_| ())),
             Err(RecvTimeoutError::Timeout) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => {

@@ -204,3 +204,25 @@ print(len(os.listdir("/proc/self/task")))
     ]
     processors = len(os.sched_getaffinity(0))
     assert threads[1] - threads[0] == min(2, processors) - 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_process_that_comes_of_one_that_has_answered_answers_as_well(folder, method):
+    # a forked process has the memory of the threads that answered before, and none of the threads
+    said = """
+import multiprocessing, sys
+import cvg
+
+def answer(campaign):
+    return cvg.identify(campaign).to_json()
+
+if __name__ == "__main__":
+    before = answer(sys.argv[1])
+    with multiprocessing.get_context(sys.argv[2]).Pool(2) as pool:
+        assert pool.map_async(answer, [sys.argv[1]] * 4).get(timeout=60) == [before] * 4
+"""
+    script = folder.parent / f"{method}.py"
+    script.write_text(said)
+    done = subprocess.run([sys.executable, "-W", "ignore", script, folder / "campaign.toml", method], timeout=100, check=False)
+    assert done.returncode == 0
