@@ -11,7 +11,8 @@ use arrow_schema::{DataType, Field, Schema};
 use cvg_calibration::recording::Channel;
 use cvg_calibration::recording::{Cells, Recording, Values};
 use cvg_cli::service::Columns;
-use numpy::PyArray1;
+use numpy::{PyArray1, PyUntypedArray};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
@@ -138,6 +139,33 @@ impl Table {
 
 #[pymethods]
 impl Table {
+    /// A table of arrays of numbers and lists of texts.
+    #[staticmethod]
+    #[pyo3(name = "of")]
+    fn of_arrays(columns: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Self> {
+        let values = |column: &Bound<'_, PyAny>| match column.extract::<Vec<String>>() {
+            Ok(texts) if !column.is_instance_of::<PyUntypedArray>() => Ok(Values::Texts(texts.into_iter().collect())),
+            _ => column.extract().map(Values::Numbers),
+        };
+        Self::of(columns.iter().map(|(name, c)| Ok((name.clone(), values(c)?))).collect::<PyResult<_>>()?)
+    }
+
+    /// Pickled as its columns.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let columns = self.to_dict(py)?.items();
+        Ok((py.import("cvg._travel")?.getattr("table")?, (columns,).into_bound_py_any(py)?))
+    }
+
+    // what never changes is its own copy
+    fn __copy__(this: Py<Self>) -> Py<Self> {
+        this
+    }
+
+    fn __deepcopy__(this: Py<Self>, memo: Bound<'_, PyAny>) -> Py<Self> {
+        drop(memo);
+        this
+    }
+
     /// Arrow's C stream of the table.
     #[pyo3(signature = (requested_schema = None))]
     fn __arrow_c_stream__<'py>(

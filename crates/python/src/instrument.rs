@@ -10,7 +10,7 @@ type Samples<'py> = Bound<'py, PyArray1<f64>>;
 
 /// The electronics of a whole-angle gyroscope: converter values in, converter values out, in f64.
 #[pyclass(module = "cvg")]
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Instrument {
     electronics: Electronics<f64>,
     state: State<f64>,
@@ -70,6 +70,16 @@ impl Instrument {
             (dac_x, dac_y, angle_deg)
         });
         Ok((PyArray1::from_vec(py, dac_x), PyArray1::from_vec(py, dac_y), PyArray1::from_vec(py, angle_deg)))
+    }
+
+    /// One that goes on from the same state.
+    fn __copy__(&self) -> Self {
+        self.clone()
+    }
+
+    fn __deepcopy__(&self, memo: Bound<'_, PyAny>) -> Self {
+        drop(memo);
+        self.clone()
     }
 
     /// What it is doing.

@@ -17,6 +17,8 @@ use crate::work::aside;
 #[derive(Debug)]
 pub(crate) struct Simulation {
     simulated: Simulated,
+    scenario: String,
+    name: String,
 }
 
 #[pymethods]
@@ -41,6 +43,21 @@ impl Simulation {
         self.simulated.truth_toml()
     }
 
+    /// Pickled as its scenario: the same one gives the same bytes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&str, &str))> {
+        Ok((py.import("cvg._travel")?.getattr("simulation")?, (&self.scenario, &self.name)))
+    }
+
+    // what never changes is its own copy
+    fn __copy__(this: Py<Self>) -> Py<Self> {
+        this
+    }
+
+    fn __deepcopy__(this: Py<Self>, memo: Bound<'_, PyAny>) -> Py<Self> {
+        drop(memo);
+        this
+    }
+
     /// Writes what `cvg simulate` writes.
     fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         py.detach(|| self.simulated.write(folder)).map_err(|e| failed(py, &Failure::input(e)))
@@ -50,6 +67,6 @@ impl Simulation {
 /// Simulates the text of a scenario.
 #[pyfunction]
 pub(crate) fn simulate(py: Python<'_>, text: String, name: String) -> PyResult<Simulation> {
-    let simulated = aside(py, None, move |_| service::simulate(&text, &name))?;
-    simulated.map(|simulated| Simulation { simulated }).map_err(|e| failed(py, &e))
+    let done = aside(py, None, move |_| service::simulate(&text, &name).map(|simulated| (simulated, text, name)))?;
+    done.map(|(simulated, scenario, name)| Simulation { simulated, scenario, name }).map_err(|e| failed(py, &e))
 }

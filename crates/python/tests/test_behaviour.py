@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import pickle
 import re
@@ -18,6 +19,7 @@ import pyarrow
 import pytest
 
 import cvg
+from conftest import SCENARIO
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +187,47 @@ def test_the_instrument_steps_over_arrays_and_goes_on_where_it_was():
 
 def test_a_calibration_travels_between_processes(report):
     assert pickle.loads(pickle.dumps(report.calibration)).to_text() == report.calibration.to_text()
+
+
+def travelled(what, how):
+    return {"pickle": lambda: pickle.loads(pickle.dumps(what)), "copy": lambda: copy.copy(what), "deep": lambda: copy.deepcopy(what)}[how]()
+
+
+@pytest.mark.parametrize("how", ["pickle", "copy", "deep"])
+def test_a_report_says_all_it_says_behind_a_pickle_and_as_a_copy(folder, how):
+    report = cvg.identify(folder / "campaign.toml", limits={"heldout.discovered.rms_deg": {"max": 1e-9}})
+    again = travelled(travelled(report, how), how)
+    assert (again.to_json(), again.html(), str(again), repr(again)) == (report.to_json(), report.html(), str(report), repr(report))
+    assert again.parameters == report.parameters and again.verdicts == report.verdicts and again.is_within_limits is False
+    assert again.calibration.to_text() == report.calibration.to_text()
+    assert again.to_frame().equals(report.to_frame())
+    for one, other in ((report.residuals(), again.residuals()), (report.bias(), again.bias())):
+        assert pyarrow.table(one).schema == pyarrow.table(other).schema and len(other) > 0
+        for name, values in one.to_dict().items():
+            numpy.testing.assert_array_equal(values, other.to_dict()[name])
+    # what is changed in the one is not changed in the other
+    again.heldout["raw"] = None
+    assert report.heldout["raw"] is not None
+
+
+@pytest.mark.parametrize("how", ["pickle", "copy", "deep"])
+def test_a_simulation_and_its_tables_travel(folder, how):
+    simulation = cvg.simulate(SCENARIO)
+    again = travelled(simulation, how)
+    assert (again.campaign_toml, again.truth_toml) == (simulation.campaign_toml, simulation.truth_toml)
+    for (name, table), (other, moved) in zip(simulation.recordings, again.recordings):
+        assert name == other and pyarrow.table(travelled(table, how)).equals(pyarrow.table(moved))
+
+
+def test_a_copy_of_an_instrument_goes_on_by_itself():
+    whole = cvg.Instrument()
+    x = 0.5 * numpy.cos(numpy.arange(2000))
+    whole.step(x, x)
+    for again in (copy.copy(whole), copy.deepcopy(whole)):
+        first = again.step(x, x)
+        again = copy.copy(whole)
+        for got, expected in zip(again.step(x, x), first):
+            numpy.testing.assert_array_equal(got, expected)
 
 
 def test_threads_are_counted_at_the_first_answer_and_not_at_the_import(folder):

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from . import _cvg
 from ._input import Data, Map, Path, entries, like
+from ._travel import Answer
 
 
 class Parameter(NamedTuple):
@@ -90,9 +91,20 @@ class Calibration:
 class Report:
     """What a campaign told. The facts of report.json are attributes: `report.heldout["discovered"]["rms_deg"]`."""
 
-    def __init__(self, native: _cvg.Report) -> None:
+    def __init__(self, native: _cvg.Report | Answer) -> None:
         self._native = native
         self._facts: dict[str, Any] | None = None
+
+    def __reduce__(self) -> tuple[object, ...]:
+        native = self._native
+        return (Report, (native if isinstance(native, Answer) else Answer.of(native),))
+
+    def __copy__(self) -> Report:
+        # what is behind it never changes
+        return Report(self._native)
+
+    def __deepcopy__(self, memo: object) -> Report:
+        return Report(self._native)
 
     def to_json(self) -> str:
         """report.json, byte for byte that of `cvg identify`."""
