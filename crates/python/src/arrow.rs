@@ -7,7 +7,7 @@ use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types as number;
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray};
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{DataType, Field, Schema, TimeUnit};
 use cvg_calibration::recording::Channel;
 use cvg_calibration::recording::{Cells, Recording, Values};
 use cvg_cli::service::Columns;
@@ -22,9 +22,9 @@ const STREAM: &CStr = c"arrow_array_stream";
 /// How pandas names an index that it hands out as a column.
 const INDEX: &str = "__index_level_";
 
-/// Columns of an object with `__arrow_c_stream__`.
-pub(crate) fn imported(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
-    let capsule = object.call_method0("__arrow_c_stream__")?.cast_into::<PyCapsule>()?;
+/// Columns of what `__arrow_c_stream__` gives.
+pub(crate) fn imported(stream: Bound<'_, PyAny>) -> PyResult<Columns> {
+    let capsule = stream.cast_into::<PyCapsule>()?;
     let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
     // SAFETY: a capsule of this name holds a valid stream, which is moved out of it: what is left is marked as released
     let stream = unsafe { FFI_ArrowArrayStream::from_raw(pointer.as_ptr()) };
@@ -45,30 +45,61 @@ pub(crate) fn imported(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
 
 /// Appends an array to a column.
 fn append(name: &str, column: &mut Option<Values>, array: &ArrayRef) -> PyResult<()> {
-    if let Some(more) = numbers(array) {
-        match column.get_or_insert_with(|| Values::Numbers(Vec::new())) {
-            Values::Numbers(values) if values.is_empty() => *values = more,
-            Values::Numbers(values) => values.extend(more),
-            Values::Texts(cells) => more.iter().for_each(|v| cells.push(&v.to_string())),
-        }
+    let more = values(array);
+    let Some(column) = column else {
+        *column = Some(more);
         return Ok(());
-    }
-    let Some(more) = texts(array) else {
-        let what = format!("column `{name}` is of the Arrow type {}; wanted numbers or text", array.data_type());
-        return Err(PyTypeError::new_err(what));
     };
-    match column.get_or_insert_with(|| Values::Texts(Cells::default())) {
-        Values::Texts(cells) => more.iter().for_each(|text| cells.push(text)),
-        Values::Numbers(_) => return Err(PyTypeError::new_err(format!("column `{name}` changes its type"))),
+    match (column, more) {
+        (Values::Numbers(all), Values::Numbers(more)) => all.extend(more),
+        (Values::Texts(all), Values::Texts(more)) => more.iter().for_each(|text| all.push(text)),
+        (Values::Unreadable { rows, .. }, Values::Unreadable { rows: more, .. }) => *rows += more,
+        _ => return Err(PyTypeError::new_err(format!("column `{name}` changes its type"))),
     }
     Ok(())
 }
 
+/// The values of an array as a recording keeps them.
+fn values(array: &dyn Array) -> Values {
+    if let Some(numbers) = numbers(array) {
+        return Values::Numbers(numbers);
+    }
+    if let Some(texts) = texts(array) {
+        return Values::Texts(texts);
+    }
+    let Some(dictionary) = array.as_any_dictionary_opt() else {
+        let why = format!("is of the Arrow type {}", array.data_type());
+        return Values::Unreadable { rows: array.len(), why };
+    };
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the keys of a dictionary are places in it"
+    )]
+    let keys = numbers(dictionary.keys()).unwrap_or_default();
+    let keys = keys.into_iter().map(|key| key.is_finite().then_some(key as usize));
+    match values(dictionary.values().as_ref()) {
+        Values::Numbers(own) => {
+            Values::Numbers(keys.map(|key| key.and_then(|key| own.get(key)).copied().unwrap_or(f64::NAN)).collect())
+        }
+        Values::Texts(own) => {
+            Values::Texts(keys.map(|key| key.and_then(|key| own.get(key)).unwrap_or_default()).collect())
+        }
+        Values::Unreadable { why, .. } => Values::Unreadable { rows: array.len(), why },
+    }
+}
+
 /// Numbers of any type as f64, nulls as NaN; none where they are no numbers.
-fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
+fn numbers(array: &dyn Array) -> Option<Vec<f64>> {
     macro_rules! from {
         ($type:ty, $convert:expr) => {
             Some(array.as_primitive::<$type>().iter().map(|v| v.map_or(f64::NAN, $convert)).collect())
+        };
+    }
+    // as a text, which is rounded once
+    macro_rules! decimal {
+        ($type:ty, $scale:expr) => {
+            from!($type, |v| format!("{v}e{}", -i32::from(*$scale)).parse().unwrap_or(f64::NAN))
         };
     }
     #[allow(clippy::cast_precision_loss, reason = "numbers of a recording are f64")]
@@ -78,6 +109,7 @@ fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
         }
         DataType::Float64 => from!(number::Float64Type, |v| v),
         DataType::Float32 => from!(number::Float32Type, f64::from),
+        DataType::Float16 => from!(number::Float16Type, |v| v.to_f64()),
         DataType::Int8 => from!(number::Int8Type, f64::from),
         DataType::Int16 => from!(number::Int16Type, f64::from),
         DataType::Int32 => from!(number::Int32Type, f64::from),
@@ -86,12 +118,25 @@ fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
         DataType::UInt16 => from!(number::UInt16Type, f64::from),
         DataType::UInt32 => from!(number::UInt32Type, f64::from),
         DataType::UInt64 => from!(number::UInt64Type, |v| v as f64),
+        DataType::Decimal32(_, scale) => decimal!(number::Decimal32Type, scale),
+        DataType::Decimal64(_, scale) => decimal!(number::Decimal64Type, scale),
+        DataType::Decimal128(_, scale) => decimal!(number::Decimal128Type, scale),
+        DataType::Decimal256(_, scale) => decimal!(number::Decimal256Type, scale),
         DataType::Null => Some(vec![f64::NAN; array.len()]),
         _ => None,
     }
 }
 
-fn texts(array: &ArrayRef) -> Option<Cells> {
+/// Texts, nulls as empty ones, and time stamps as ISO 8601 writes them: those that have a zone are of UTC.
+fn texts(array: &dyn Array) -> Option<Cells> {
+    macro_rules! stamps {
+        ($type:ty, $zone:expr) => {{
+            let (array, zone) = (array.as_primitive::<$type>(), $zone.as_ref().map_or("", |_| "Z"));
+            let text =
+                |row| array.value_as_datetime(row).filter(|_| array.is_valid(row)).map(|at| format!("{at}{zone}"));
+            Some((0..array.len()).map(|row| text(row).unwrap_or_default()).collect())
+        }};
+    }
     match array.data_type() {
         DataType::Utf8 => Some(array.as_string::<i32>().iter().map(Option::unwrap_or_default).collect()),
         DataType::LargeUtf8 => Some(array.as_string::<i64>().iter().map(Option::unwrap_or_default).collect()),
@@ -99,6 +144,10 @@ fn texts(array: &ArrayRef) -> Option<Cells> {
         DataType::Boolean => {
             Some(array.as_boolean().iter().map(|v| v.map_or("", |v| if v { "true" } else { "false" })).collect())
         }
+        DataType::Timestamp(TimeUnit::Second, zone) => stamps!(number::TimestampSecondType, zone),
+        DataType::Timestamp(TimeUnit::Millisecond, zone) => stamps!(number::TimestampMillisecondType, zone),
+        DataType::Timestamp(TimeUnit::Microsecond, zone) => stamps!(number::TimestampMicrosecondType, zone),
+        DataType::Timestamp(TimeUnit::Nanosecond, zone) => stamps!(number::TimestampNanosecondType, zone),
         _ => None,
     }
 }
@@ -118,6 +167,7 @@ impl Table {
             let array: ArrayRef = match values {
                 Values::Numbers(values) => Arc::new(Float64Array::from(values)),
                 Values::Texts(cells) => Arc::new(StringArray::from_iter_values(cells.iter())),
+                Values::Unreadable { why, .. } => return Err(PyTypeError::new_err(format!("column `{name}` {why}"))),
             };
             fields.push(Field::new(name, array.data_type().clone(), false));
             arrays.push(array);

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import datetime
+import decimal
 import os
 import pickle
 import re
@@ -89,6 +91,108 @@ def test_what_a_mask_hides_is_missing_and_not_read(folder):
     masked["xc_v"] = numpy.ma.masked_array(numpy.where(hidden, 0.5, plain["xc_v"]), hidden)
     read = [cvg.identify(columns, name="bench").to_json() for columns in (absent, masked, plain)]
     assert read[0] == read[1] != read[2]
+
+
+def frames(table: pandas.DataFrame):
+    """The same recording in as many forms as programs keep it."""
+    arrow = pyarrow.Table.from_pandas(table)
+
+    def with_rate(rate):
+        return arrow.set_column(arrow.schema.get_field_index("rate_dps"), "rate_dps", rate)
+
+    yield "text", table.astype(str)
+    yield "text of Arrow", pyarrow.table({name: table[name].astype(str) for name in table})
+    yield "texts in arrays", {name: table[name].astype(str).to_numpy() for name in table}
+    yield "Python's numbers", {name: table[name].astype(object).to_numpy() for name in table}
+    yield "nullable numbers", table.astype("Float64").astype({"rate_dps": "Int64"})
+    yield "categories", table.astype({"rate_dps": "category"})
+    yield "dictionary", with_rate(arrow["rate_dps"].dictionary_encode())
+    yield "decimal", with_rate(arrow["rate_dps"].cast(pyarrow.decimal128(30, 3)))
+    yield "float16", with_rate(arrow["rate_dps"].cast(pyarrow.float16()))
+    yield "Decimal", {name: table[name] for name in table} | {"rate_dps": [decimal.Decimal(500)] * len(table)}
+    yield "chunks", pyarrow.concat_tables([arrow.slice(at, 97) for at in range(0, len(arrow), 97)])
+    yield "big-endian", {name: table[name].to_numpy().astype(">f8") for name in table}
+    yield "strides", {name: numpy.repeat(table[name].to_numpy(), 3)[::3] for name in table}
+    yield "backwards", {name: table[name].to_numpy()[::-1].copy()[::-1] for name in table}
+    yield "series of polars", {name: polars.from_pandas(table)[name] for name in table}
+    yield "an index of times", table.set_index("t_s")
+
+
+def test_the_same_recording_in_any_form_has_the_same_report(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    expected = cvg.identify(table, name="bench").to_json()
+    for form, frame in frames(table):
+        assert cvg.identify(frame, name="bench").to_json() == expected, form
+
+
+def test_what_is_not_there_is_missing_in_any_form(folder):
+    table = pandas.read_csv(folder / "rot+500.csv").astype(float)
+    table.iloc[77] = numpy.nan
+    expected = cvg.identify(table, name="bench").to_json()
+    numbers = polars.from_pandas(table, nan_to_null=True)
+    forms = {
+        "polars": numbers,
+        "pandas": table.astype("Float64"),
+        "lists": {name: [None if value != value else value for value in table[name]] for name in table},
+        "objects of pandas": {name: table[name].astype("Float64").astype(object).to_numpy() for name in table},
+        "arrays of Arrow": {name: numbers[name].to_arrow() for name in numbers.columns},
+    }
+    for form, frame in forms.items():
+        assert cvg.identify(frame, name="bench").to_json() == expected, form
+
+
+def test_time_stamps_are_counted_from_the_first(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    stamps = pandas.Timestamp("2026-03-01 12:00") + pandas.to_timedelta(table["t_s"], unit="s")
+    own = table.assign(t_s=stamps)
+    plain = {name: table[name].to_numpy() for name in table}
+    forms = {
+        "pandas": own,
+        "a zone": own.assign(t_s=stamps.dt.tz_localize("Europe/Berlin")),
+        "an index": own.set_index("t_s"),
+        "polars": polars.from_pandas(own),
+        "numpy": plain | {"t_s": stamps.to_numpy()},
+        "Python": plain | {"t_s": list(stamps.dt.to_pydatetime())},
+    }
+    for form, frame in forms.items():
+        report = cvg.identify(frame, name="bench")
+        assert any("dates" in warning for warning in report.warnings), form
+        expected = cvg.identify(table, name="bench")
+        for one, other in zip(report.parameters, expected.parameters):
+            assert one.name == other.name and one.value == pytest.approx(other.value, rel=1e-6, abs=1e-9), form
+    for differences in (table.assign(t_s=stamps - stamps[0]), plain | {"t_s": (stamps - stamps[0]).to_numpy()}):
+        with pytest.raises(cvg.InputError, match="`t_s` is of .*(Duration|timedelta).*wanted numbers"):
+            cvg.identify(differences)
+
+
+def test_a_column_that_is_no_channel_is_in_nobodys_way(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    expected = [p.value for p in cvg.identify(table).parameters]
+    rows = len(table)
+    for what, column in {
+        "stamps": [pandas.Timestamp("2026-03-01")] * rows,
+        "days": [datetime.date(2026, 3, 1)] * rows,
+        "lists": [[1.0, 2.0]] * rows,
+        "objects": [{"a": [1]}] * rows,
+        "of two kinds": [1 if row % 2 else "a" for row in range(rows)],
+        "beyond integers": [10**30] * rows,
+        "bytes": [b"x"] * rows,
+        "categories": pandas.Categorical(["a", "b"] * (rows // 2)),
+    }.items():
+        report = cvg.identify(table.assign(extra=column))
+        assert [p.value for p in report.parameters] == expected, what
+        assert any("extra" in warning for warning in report.warnings), what
+
+
+def test_what_is_no_table_says_what_is_wanted(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    with pytest.raises(cvg.InputError, match="one column of a name"):
+        cvg.identify(pandas.concat([table, table[["xc_v"]]], axis=1))
+    for wrong in (polars.from_pandas(table).lazy(), (row for row in ()), table.to_numpy()):
+        with pytest.raises(TypeError, match="wanted a frame with its rows"):
+            cvg.identify(wrong)
+    with pytest.raises(cvg.InputError, match="say which column is which"):
+        cvg.identify(table.set_axis(pandas.MultiIndex.from_tuples([("a", name) for name in table]), axis=1))
 
 
 def test_the_report_has_its_facts_as_attributes_frames_and_a_page(report):

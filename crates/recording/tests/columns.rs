@@ -50,12 +50,72 @@ fn columns_that_cannot_be_a_recording_are_refused_with_their_place() {
     short[1].1 = Values::Numbers(vec![1.0]);
     assert!(made(short, Naming::NONE).unwrap_err().to_string().contains("`rate_dps` has 1 values"));
     let mut text = columns();
-    text[2].1 = Values::Texts(["1", "2", "3", "4"].into_iter().collect());
+    text[2].1 = texts(["1", "2", "three", "4"]);
     let error = made(text, Naming::NONE).unwrap_err();
-    assert_eq!((error.place(), error.column(), error.path()), (Some(Place::Row(1)), Some(3), Path::new("frame")));
+    assert_eq!((error.place(), error.column(), error.path()), (Some(Place::Row(3)), Some(3), Path::new("frame")));
+    assert!(error.to_string().contains("\"three\" is not a number"), "{error}");
+    let mut lists = columns();
+    lists[2].1 = lists_of(4);
+    let error = made(lists, Naming::NONE).unwrap_err().to_string();
+    assert!(error.contains("`theta_deg` is of the type LIST") && error.contains("wanted numbers"), "{error}");
     let without = columns().into_iter().take(2).collect();
     assert!(matches!(made(without, Naming::NONE), Err(ReadError::MissingColumns { .. })));
     assert!(made(Vec::new(), Naming::NONE).is_err());
+}
+
+fn texts(cells: [&str; 4]) -> Values {
+    Values::Texts(cells.into_iter().collect())
+}
+
+fn lists_of(rows: usize) -> Values {
+    Values::Unreadable { rows, why: "is of the type LIST".to_owned() }
+}
+
+#[test]
+fn the_texts_of_a_channel_are_read_as_in_csv() {
+    let mut own = columns();
+    own[0].1 = texts(["0", "0.1", "2e-1", " 0.3 "]);
+    own[2].1 = texts(["0.5", "NA", "2.5", "3.5"]);
+    let (own, numbers) = (made(own, Naming::NONE).unwrap(), made(columns(), Naming::NONE).unwrap());
+    assert_eq!((&own.t_s, &own.theta_deg, &own.warnings), (&numbers.t_s, &numbers.theta_deg, &numbers.warnings));
+}
+
+#[test]
+fn dates_in_the_place_of_times_are_counted_from_the_first() {
+    let mut own = columns();
+    own[0].1 = texts([
+        "2026-03-01 12:00:00",
+        "2026-03-01T12:00:00.1",
+        "2026-03-01T12:00:00.2",
+        "2026-03-01 12:00:00.300000000",
+    ]);
+    let read = made(own.clone(), Naming::NONE).unwrap();
+    assert_eq!(read.t_s, [0.0, 0.2, 3e8 * 1e-9], "the row without an angle is dropped");
+    assert!(read.warnings.iter().any(|w| w.contains("dates")), "{:?}", read.warnings);
+    // a unit in the name is none of dates, and a factor cannot be meant
+    own[0].0 = "Time (ms)".to_owned();
+    let mut naming = Naming::default();
+    naming.add("t_s=Time (ms)").unwrap();
+    assert_eq!(made(own.clone(), &naming).unwrap().t_s, [0.0, 0.2, 3e8 * 1e-9]);
+    let mut scaled = Naming::default();
+    scaled.add("t_s=Time (ms)*0.001").unwrap();
+    assert!(made(own.clone(), &scaled).unwrap_err().to_string().contains("factor"));
+    own[0] = ("t_s".to_owned(), texts(["2026-03-01 12:00:00", "0.1", "0.2", "0.3"]));
+    assert_eq!(made(own, Naming::NONE).unwrap_err().place(), Some(Place::Row(2)));
+}
+
+#[test]
+fn what_cannot_be_read_and_is_no_channel_is_left_out_and_said() {
+    let mut own = columns();
+    own.insert(0, ("peaks".to_owned(), lists_of(4)));
+    let read = made(own, Naming::NONE).unwrap();
+    let plain = made(columns(), Naming::NONE).unwrap();
+    assert_eq!((&read.t_s, &read.unknown), (&plain.t_s, &plain.unknown));
+    assert!(
+        read.warnings.contains(&"frame: column `peaks` is of the type LIST and is left out".to_owned()),
+        "{:?}",
+        read.warnings
+    );
 }
 
 #[test]

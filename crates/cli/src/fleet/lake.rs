@@ -48,6 +48,7 @@ impl Member {
                     sum.update(&(cell.len() as u64).to_le_bytes());
                     sum.update(cell.as_bytes());
                 }),
+                Values::Unreadable { why, .. } => sum.update(why.as_bytes()),
             }
         }
         let crc32 = format!("{:08x}", sum.finalize());
@@ -104,6 +105,9 @@ fn said(columns: &Columns, word: &str, of: &str) -> Result<String, Failure> {
         _ if first.is_empty() => String::new(),
         Values::Numbers(_) => format!("{word} = {first}\n"),
         Values::Texts(_) => format!("{word} = {}\n", quoted(&first)),
+        Values::Unreadable { why, .. } => {
+            return Err(Failure::input(format!("{of}: `{word}` {why}; wanted numbers or texts")));
+        }
     })
 }
 
@@ -116,6 +120,8 @@ fn cell(values: &Values, row: usize) -> String {
     match values {
         Values::Numbers(numbers) => numbers.get(row).filter(|v| v.is_finite()).map_or(String::new(), f64::to_string),
         Values::Texts(cells) => cells.get(row).unwrap_or_default().to_owned(),
+        // it is there, whatever it is
+        Values::Unreadable { why, .. } => why.clone(),
     }
 }
 
@@ -127,5 +133,6 @@ fn picked(values: &Values, rows: &[usize]) -> Values {
             rows.iter().for_each(|row| out.push(cells.get(*row).unwrap_or_default()));
             Values::Texts(out)
         }
+        Values::Unreadable { why, .. } => Values::Unreadable { rows: rows.len(), why: why.clone() },
     }
 }

@@ -51,6 +51,7 @@ pub(super) fn csv(columns: &Columns) -> String {
         let cell = |(_, values): &(String, Values)| match values {
             Values::Numbers(numbers) => number(Some(numbers[row])),
             Values::Texts(cells) => quoted(cells.get(row).unwrap_or_default()),
+            Values::Unreadable { .. } => String::new(),
         };
         let _ = writeln!(out, "{}", columns.iter().map(cell).collect::<Vec<_>>().join(","));
     }

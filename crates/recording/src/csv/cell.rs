@@ -4,7 +4,7 @@
 
 /// How numbers are written in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Decimal {
+pub(crate) enum Decimal {
     Point,
     Comma,
 }
@@ -29,7 +29,7 @@ impl Decimal {
 
 /// What a cell says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Cell {
+pub(crate) enum Cell {
     /// A finite number.
     Number(f64),
     /// Empty, or a word for a number that is not there, or not finite.
@@ -46,7 +46,7 @@ pub(super) fn trim(cell: &[u8]) -> &[u8] {
 }
 
 /// Reads a cell.
-pub(super) fn read(cell: &[u8], decimal: Decimal) -> Cell {
+pub(crate) fn read(cell: &[u8], decimal: Decimal) -> Cell {
     let cell = trim(cell);
     if cell.is_empty() {
         return Cell::Missing;

@@ -6,7 +6,7 @@
 mod assembly;
 mod beneath;
 mod blocks;
-mod cell;
+pub(crate) mod cell;
 mod digits;
 mod head;
 mod piece;

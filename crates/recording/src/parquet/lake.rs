@@ -149,14 +149,16 @@ fn columns(
     source: &Path,
 ) -> Result<Columns, ReadError> {
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let why = |at: usize| unreadable(&schema.column(at), false);
+    // what is no number or text may be of no concern: that is for the recording to say, and not read before
+    let unread = kept.iter().filter_map(|&at| Some((schema.column(at).path().string(), why(at)?)));
+    let rows = usize::try_from(reader.metadata().row_group(group).num_rows()).unwrap_or(0);
+    let unread: Columns = unread.map(|(name, why)| (name, Values::Unreadable { rows, why })).collect();
+    let kept: Vec<usize> = kept.iter().copied().filter(|&at| why(at).is_none()).collect();
+    let kept = kept.as_slice();
     let mut fields = vec![];
     for at in kept {
-        let description = schema.column(*at);
-        if let Some(why) = unreadable(&description, false) {
-            let name = description.path().string();
-            return Err(refuse(source, format!("column `{name}` {why}; wanted plain numbers or texts")));
-        }
-        let is_text = matches!(description.physical_type(), Type::BYTE_ARRAY | Type::BOOLEAN);
+        let is_text = matches!(schema.column(*at).physical_type(), Type::BYTE_ARRAY | Type::BOOLEAN);
         fields.push(if is_text { Field::Text(0) } else { Field::Number(0) });
     }
     refuse_codecs(reader, kept, source)?;
@@ -172,7 +174,8 @@ fn columns(
         };
         Ok((schema.column(*at).path().string(), values))
     };
-    kept.iter().zip(&fields).map(read).collect()
+    let read: Result<Columns, _> = kept.iter().zip(&fields).map(read).collect();
+    Ok(read?.into_iter().chain(unread).collect())
 }
 
 /// Puts the rows of a row group to those of their devices.
@@ -201,6 +204,7 @@ fn split(mut read: Columns, begun: &mut BTreeMap<String, Columns>, source: &Path
                 (Values::Texts(to), Values::Texts(from)) => {
                     (row..next).for_each(|at| to.push(from.get(at).unwrap_or_default()));
                 }
+                (Values::Unreadable { rows, .. }, Values::Unreadable { .. }) => *rows += next - row,
                 (_, _) => {
                     return Err(refuse(source, format!("column `{name}` is of another type than in the file before")));
                 }
@@ -216,6 +220,7 @@ fn like(values: &Values) -> Values {
     match values {
         Values::Numbers(_) => Values::Numbers(vec![]),
         Values::Texts(_) => Values::Texts(Cells::default()),
+        Values::Unreadable { why, .. } => Values::Unreadable { rows: 0, why: why.clone() },
     }
 }
 
@@ -223,6 +228,7 @@ fn texts(values: Values) -> Cells {
     match values {
         Values::Texts(cells) => cells,
         Values::Numbers(numbers) => numbers.iter().map(f64::to_string).collect(),
+        Values::Unreadable { rows, .. } => (0..rows).map(|_| "").collect(),
     }
 }
 
@@ -230,5 +236,6 @@ fn size(values: &Values) -> usize {
     match values {
         Values::Numbers(numbers) => size_of_val(numbers.as_slice()),
         Values::Texts(cells) => cells.iter().map(|cell| cell.len() + size_of::<usize>()).sum(),
+        Values::Unreadable { .. } => 0,
     }
 }

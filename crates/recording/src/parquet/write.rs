@@ -28,15 +28,19 @@ impl Recording {
 /// Writes columns of one length as Parquet, in their order: of results, say.
 ///
 /// # Errors
-/// What the writer says, or [`io::ErrorKind::InvalidInput`] for columns that differ in length.
+/// What the writer says, or [`io::ErrorKind::InvalidInput`] for columns that differ in length or cannot be
+/// read.
 pub fn write_parquet(columns: &[(String, Values)], writer: impl Write + Send) -> io::Result<()> {
     let outlets: Vec<(&str, Outlet<'_>)> = columns
         .iter()
         .map(|(name, values)| match values {
-            Values::Numbers(numbers) => (name.as_str(), Outlet::Numbers(numbers)),
-            Values::Texts(cells) => (name.as_str(), Outlet::Texts(cells)),
+            Values::Numbers(numbers) => Ok((name.as_str(), Outlet::Numbers(numbers))),
+            Values::Texts(cells) => Ok((name.as_str(), Outlet::Texts(cells))),
+            Values::Unreadable { why, .. } => {
+                Err(io::Error::new(io::ErrorKind::InvalidInput, format!("column `{name}` {why}")))
+            }
         })
-        .collect();
+        .collect::<Result<_, _>>()?;
     even(&outlets)?;
     write(&outlets, writer).map_err(io::Error::other)
 }
