@@ -7,6 +7,7 @@ import pathlib
 import signal
 
 import pyarrow
+import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
@@ -27,6 +28,22 @@ run = [
   {{ kind = "rotation", file = "forth.csv", rate_dps = 500.0, duration_s = 8.0, settle_s = 0.5 }},
   {{ kind = "rotation", file = "back.csv", rate_dps = -300.0, duration_s = 8.0, settle_s = 0.5 }},
 ]
+"""
+
+
+EFFECT = """
+id = "own-cubic"
+stage = "readout"
+
+[[parameter]]
+name = "own"
+unit = "1/V^2"
+neutral = 0.0
+scale = 1e-3
+
+[map]
+"x'" = "x * (1 + 2 * own * abs(x)^2)"
+"y'" = "y * (1 + 2 * own * abs(y)^2)"
 """
 
 
@@ -115,22 +132,92 @@ def test_a_lake_goes_on_where_it_was_broken_off(lake, tmp_path, monkeypatch):
     path, out = tmp_path / "lake.parquet", tmp_path / "answers.parquet"
     pyarrow.parquet.write_table(lake, path)
     assert fleet.names(path) == [f"unit-{n:02}" for n in range(DEVICES) if n != 3]
-    answer, asked = fleet.identify_in, []
+    answer, asked = fleet.identify_device, []
 
-    def counted(lake, device, **options):
+    def counted(table, **options):
         if len(asked) == 4:
             raise KeyboardInterrupt
-        asked.append(device)
-        return answer(lake, device, **options)
+        asked.append(table["device"][0].as_py())
+        return answer(table, **options)
 
-    monkeypatch.setattr(fleet, "identify_in", counted)
+    def counted_on(table, **options):
+        asked.append(table["device"][0].as_py())
+        return answer(table, **options)
+
+    monkeypatch.setattr(fleet, "identify_device", counted)
     with pytest.raises(KeyboardInterrupt):
         fleet.identify_lake(path, out)
     assert pyarrow.parquet.read_table(out)["device"].to_pylist() == asked
-    monkeypatch.setattr(fleet, "identify_in", lambda *a, **o: asked.append(a[1]) or answer(*a, **o))
+    monkeypatch.setattr(fleet, "identify_device", counted_on)
     rows = fleet.identify_lake(path, out)
     assert sorted(asked) == fleet.names(path), "each once"
+    written = out.read_bytes()
+    assert fleet.identify_lake(path, out).equals(rows) and len(asked) == DEVICES - 1 and out.read_bytes() == written
+    monkeypatch.undo()
     assert rows.equals(pyarrow.parquet.read_table(out)) and rows.equals(fleet.identify_table(lake))
+
+
+def test_an_answer_is_kept_only_where_it_is_to_the_same_question(lake, tmp_path, monkeypatch):
+    path, out = tmp_path / "lake.parquet", tmp_path / "answers.parquet"
+    few = lake.filter(pc.is_in(lake["device"], pyarrow.array(["unit-00", "unit-01", "unit-02"])))
+    pyarrow.parquet.write_table(few, path)
+    fleet.identify_lake(path, out)
+    answer, asked = fleet.identify_device, []
+    monkeypatch.setattr(fleet, "identify_device", lambda t, **o: asked.append(t["device"][0].as_py()) or answer(t, **o))
+    # other options
+    effect = tmp_path / "own.toml"
+    effect.write_text(EFFECT)
+    options = {"device": "another"}, {"effects": [effect]}
+    for option in options:
+        rows = fleet.identify_lake(path, out, **option)
+        assert asked == ["unit-00", "unit-01", "unit-02"], option
+        asked.clear()
+        assert fleet.identify_lake(path, out, **option).equals(rows) and not asked, "kept"
+    # a file of the same name that says something else
+    effect.write_text(EFFECT.replace("2 *", "3 *"))
+    fleet.identify_lake(path, out, effects=[effect])
+    assert len(asked) == 3
+    asked.clear()
+    # other rows of one device, another device gone
+    fleet.identify_lake(path, out)
+    asked.clear()
+    changed = few.filter(pc.not_equal(few["device"], "unit-02"))
+    changed = pyarrow.concat_tables([changed.slice(0, 100), changed.slice(101)])
+    pyarrow.parquet.write_table(changed, path)
+    assert fleet.identify_lake(path, out)["device"].to_pylist() == ["unit-00", "unit-01"] and asked == ["unit-00"]
+    asked.clear()
+    # another version
+    monkeypatch.setattr(fleet._cvg, "__version__", "0.0.0")
+    fleet.identify_lake(path, out)
+    assert asked == ["unit-00", "unit-01"]
+    # what is not of ours
+    pyarrow.parquet.write_table(pyarrow.table({"device": ["unit-00"]}), out)
+    assert len(fleet.identify_lake(path, out)) == 2
+
+
+def test_devices_have_names_of_any_type(lake, tmp_path):
+    few = lake.filter(pc.is_in(lake["device"], pyarrow.array(["unit-00", "unit-01"])))
+    second = pc.equal(few["device"], "unit-01")
+    numbers = pc.if_else(second, 11, 9)
+    for kind, names in {
+        "int": (numbers, ["11", "9"]),
+        "float": (pc.cast(numbers, pyarrow.float64()), ["11", "9"]),
+        "dictionary": (few["device"].dictionary_encode(), ["unit-00", "unit-01"]),
+        "null": (pc.if_else(second, None, few["device"]), ["", "unit-00"]),
+    }.items():
+        column, expected = names
+        path, out = tmp_path / f"{kind}.parquet", tmp_path / f"{kind}-answers.parquet"
+        pyarrow.parquet.write_table(few.set_column(few.schema.get_field_index("device"), "device", column), path)
+        assert fleet.names(path) == expected, kind
+        rows = fleet.identify_lake(path, out).to_pylist()
+        alone = fleet.identify_table(pyarrow.parquet.read_table(path)).sort_by("device").to_pylist()
+        assert alone == sorted(rows, key=lambda row: row["device"]), kind
+        assert [row["device"] for row in rows] == expected, kind
+        for row in rows:
+            if row["device"]:
+                assert row["status"] == "answered", (kind, row["reason"])
+            else:
+                assert "rows have no `device`" in row["reason"]
 
 
 def test_rows_that_cannot_be_one_device_are_a_row_that_says_so(lake):

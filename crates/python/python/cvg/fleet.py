@@ -6,8 +6,11 @@ call it as it is; `identify_table` answers a table of several devices, one after
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import pathlib
+import time
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -17,7 +20,7 @@ from pyarrow import dataset, parquet
 
 from . import _cvg, identify
 from ._errors import InputError, NoAnswer
-from ._input import Path, Run, is_path
+from ._input import Path, Run, is_path, several
 from ._report import Report
 
 #: the column that tells devices apart, and the one that tells the recordings of a device apart
@@ -25,6 +28,11 @@ DEVICE, RUN = "device", "run"
 #: what a campaign file says of a device and of a run may stand in columns of these names, each the same in all its rows
 OF_DEVICE = ("instrument", "carrier_hz", "angular_gain", "period_deg", "pole_pairs", "reference", "temperature_c")
 OF_RUN = ("kind", "settle_s", "use", "amplitude", "angle_deg", "energy_off_s")
+
+#: what the answers in a file of `identify_lake` rest on
+BASIS = "cvg.basis"
+#: a file of answers is written where what was answered since took this many times as long
+SHARE = 20
 
 PARAMETER = pa.struct(
     [("name", pa.string()), ("unit", pa.string()), ("value", pa.float64()), ("low", pa.float64()), ("high", pa.float64())]
@@ -76,15 +84,27 @@ def _one(table: pa.Table, name: str, of: str) -> Any:
     return values[0]
 
 
+def _names(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Names as text, whatever type a lake has for them; rows without one have an empty one."""
+    return pc.fill_null(pc.cast(column, pa.string()), "")
+
+
 def _runs(table: pa.Table, device: str) -> tuple[list[Run], dict[str, object]]:
     """The recordings in the rows of one device, in the order in which they begin, and what is said of the device."""
     head: dict[str, object] = {"device": device}
     head |= {word: _one(table, word, device) for word in OF_DEVICE if word in table.column_names}
-    names = pc.unique(table[RUN]).to_pylist() if RUN in table.column_names else ["recording"]
+    names, named = ["recording"], None
+    # a column that says nothing is none
+    if RUN in table.column_names and table[RUN].null_count < len(table):
+        named = _names(table[RUN])
+        names = pc.unique(named).to_pylist()
+    if "" in names:
+        some = pc.sum(pc.equal(named, "")).as_py()
+        raise InputError(f"{device}: `run` says nothing in {some} of {len(table)} rows; wanted a name in each")
     said = [word for word in (DEVICE, RUN, *OF_DEVICE, *OF_RUN) if word in table.column_names]
     runs = []
     for name in names:
-        rows = table.filter(pc.equal(table[RUN], name)) if RUN in table.column_names else table
+        rows = table if named is None else table.filter(pc.equal(named, name))
         words = {word: _one(rows, word, f"{device}, {name}") for word in OF_RUN if word in rows.column_names}
         holdout = words.pop("use", None) == "holdout"
         words["kind"] = words.get("kind") or "rotation"
@@ -111,7 +131,9 @@ def identify_device(x: Any, **options: Any) -> pa.Table:
         else:
             table = x if isinstance(x, pa.Table) else pa.table(x)
             if DEVICE in table.column_names:
-                device = str(_one(table, DEVICE, "a device's table"))
+                device = str(_one(pa.table({DEVICE: _names(table[DEVICE])}), DEVICE, "a device's table"))
+                if not device:
+                    raise InputError(f"{len(table)} rows have no `device`; wanted a name in each")
             runs, head = _runs(table, device)
             row = _answered(identify(runs, campaign=head, **options))
     except NoAnswer as error:
@@ -123,8 +145,9 @@ def identify_device(x: Any, **options: Any) -> pa.Table:
 
 def devices(table: pa.Table) -> Iterator[tuple[str, pa.Table]]:
     """The devices in a table and their rows, in the order in which they begin."""
-    for device in pc.unique(table[DEVICE]).to_pylist():
-        yield str(device), table.filter(pc.equal(table[DEVICE], device))
+    named = _names(table[DEVICE])
+    for device in pc.unique(named).to_pylist():
+        yield str(device), table.filter(pc.equal(named, device))
 
 
 def identify_table(table: pa.Table, **options: Any) -> pa.Table:
@@ -136,38 +159,109 @@ def identify_table(table: pa.Table, **options: Any) -> pa.Table:
 def names(lake: Path) -> list[str]:
     """The devices in a lake: a Parquet file, or a folder of them."""
     column = dataset.dataset(lake).to_table(columns=[DEVICE])[DEVICE]
-    return sorted(str(device) for device in pc.unique(column).to_pylist())
+    return sorted(pc.unique(_names(column)).to_pylist())
 
 
 def identify_in(lake: Path, device: str, **options: Any) -> pa.Table:
     """Answers one device of a lake, of which no other row is kept."""
-    return identify_device(dataset.dataset(lake).to_table(filter=pc.field(DEVICE) == device), **options)
+    return identify_device(_rows(dataset.dataset(lake), device), **options)
+
+
+def _rows(rows: dataset.Dataset, device: str) -> pa.Table:
+    """The rows of a device of a lake."""
+    column, kind = pc.field(DEVICE), rows.schema.field(DEVICE).type
+    if not device:
+        return rows.to_table(filter=column.is_null() | (column.cast(pa.string()) == ""))
+    if pa.types.is_integer(kind):
+        # by their numbers, by which row groups that have others are left unread
+        return rows.to_table(filter=column == pa.scalar(int(device), kind))
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
+        return rows.to_table(filter=column == device)
+    return rows.to_table(filter=column.cast(pa.string()) == device)
 
 
 def identify_lake(lake: Path, out: Path, **options: Any) -> pa.Table:
     """Answers every device of a lake into the Parquet file `out`, one after the other, and returns what is in it.
 
-    Devices that `out` has are kept: a run that was broken off goes on where it was. Answers of another version of `cvg`
-    are made anew; whether the lake is still the same is for the caller to know.
+    Answers that `out` has are kept where they rest on the same rows, the same options and the same version of `cvg`, so that a
+    run that was broken off goes on where it was. What was answered is written whenever that takes little of the time, and
+    where it ends, be it by an exception. Two programs at a time want two files.
     """
     target = os.fspath(out)
-    rows = {row["device"][0].as_py(): row for row in _kept(target)}
-    for device in names(lake):
-        if device not in rows:
-            rows[device] = identify_in(lake, device, **options)
-            # a file that is whole or not there
-            parquet.write_table(pa.concat_tables(rows.values()), target + ".part")
-            os.replace(target + ".part", target)
-    return pa.concat_tables(rows.values()) if rows else SCHEMA.empty_table()
+    kept, rows = _kept(target), {}
+    asked = _asked(options)
+    begun, wrote_s, changed = time.monotonic(), 0.0, False
+    source = dataset.dataset(lake)
+    try:
+        for device in names(lake):
+            table = _rows(source, device)
+            basis = f"{asked} {_sum(table)}"
+            if kept.get(device, (None, ""))[1] == basis:
+                rows[device] = kept[device]
+                continue
+            rows[device] = (identify_device(table, **options), basis)
+            changed = True
+            if time.monotonic() - begun > SHARE * wrote_s:
+                # those that are yet to be looked at stay, too
+                wrote_s, begun, changed = _write({**kept, **rows}, target), time.monotonic(), False
+    except BaseException:
+        if changed:
+            _write({**kept, **rows}, target)
+        raise
+    if changed or list(rows) != list(kept):
+        _write(rows, target)
+    return pa.concat_tables([row for row, _ in rows.values()]) if rows else SCHEMA.empty_table()
 
 
-def _kept(target: str) -> Iterator[pa.Table]:
+def _asked(options: dict[str, Any]) -> str:
+    """What an answer rests on beside the rows: the version and the options, of files their bytes."""
+
+    def said(name: str, value: Any) -> Any:
+        if name == "effects":
+            return [hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest() for file in several(value)]
+        return list(value) if name == "map" and not isinstance(value, (str, dict)) else value
+
+    # who is told what is going on changes nothing
+    words = {name: said(name, value) for name, value in options.items() if name != "progress" and value is not None}
+    text = json.dumps([_cvg.__version__, words], sort_keys=True, default=repr)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _sum(table: pa.Table) -> str:
+    """A checksum of rows: of the names of the columns, their types and values."""
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, table.schema.remove_metadata()) as stream:
+        stream.write_table(table.combine_chunks().replace_schema_metadata())
+    return hashlib.sha256(sink.getvalue()).hexdigest()
+
+
+def _write(rows: dict[str, tuple[pa.Table, str]], target: str) -> float:
+    """Writes answers into a file that is whole or not there, and says how long that took, in s."""
+    begun = time.monotonic()
+    table = pa.concat_tables([row for row, _ in rows.values()]) if rows else SCHEMA.empty_table()
+    # by the lake's names: an option may say another
+    basis = json.dumps([(device, basis) for device, (_, basis) in rows.items()])
+    part = f"{target}.{os.getpid()}.part"
+    try:
+        parquet.write_table(table.replace_schema_metadata({BASIS: basis}), part)
+        os.replace(part, target)
+    finally:
+        if os.path.exists(part):
+            os.remove(part)
+    return time.monotonic() - begun
+
+
+def _kept(target: str) -> dict[str, tuple[pa.Table, str]]:
+    """The answers that are there, and what each rests on."""
     if not os.path.exists(target):
-        return
-    table = parquet.read_table(target, schema=SCHEMA)
-    for at, report in enumerate(table["report"].to_pylist()):
-        if report is not None and json.loads(report)["tool"]["version"] == _cvg.__version__:
-            yield table.slice(at, 1)
+        return {}
+    table = parquet.read_table(target)
+    said = (table.schema.metadata or {}).get(BASIS.encode())
+    basis = json.loads(said) if said else []
+    if len(basis) != len(table) or table.schema.remove_metadata() != SCHEMA:
+        return {}
+    table = table.replace_schema_metadata()
+    return {device: (table.slice(at, 1), rests_on) for at, (device, rests_on) in enumerate(basis)}
 
 
 def population(rows: pa.Table | Iterable[pa.Table]) -> dict[str, Any]:
