@@ -64,11 +64,12 @@ class Simulation:
     def __copy__(self) -> Simulation: ...
     def __deepcopy__(self, memo: object) -> Simulation: ...
 
+@final
 class Instrument:
     """The electronics of a whole-angle gyroscope, as firmware runs them, in f64."""
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         *,
         carrier_hz: float | None = None,
         sample_hz: float | None = None,
@@ -77,7 +78,7 @@ class Instrument:
         drive_per_s_v: float | None = None,
         readout_delay_s: float | None = None,
         drive_delay_s: float | None = None,
-    ) -> None: ...
+    ) -> Instrument: ...
     @property
     def mode(self) -> str: ...
     @property
