@@ -209,6 +209,7 @@ fn part(columns: &[(String, Values)], rows: std::ops::Range<usize>) -> Vec<u8> {
     let cut = |values: &Values| match values {
         Values::Numbers(v) => Values::Numbers(v[rows.clone()].to_vec()),
         Values::Texts(cells) => Values::Texts(rows.clone().map(|row| cells.get(row).unwrap().to_owned()).collect()),
+        Values::Unreadable { why, .. } => panic!("{why}"),
     };
     let columns: Vec<(String, Values)> = columns.iter().map(|(name, v)| (name.clone(), cut(v))).collect();
     let mut out = Vec::new();
@@ -251,6 +252,64 @@ fn a_lake_is_answered_as_the_campaigns_in_it_are_and_goes_on_where_it_was_broken
     assert_eq!(fleet(lake.path(), of_lake.path()).status, 0);
     assert!(written(0) > before[0], "what changed is identified anew");
     assert_eq!(written(2), before[1], "what did not is kept");
+}
+
+#[test]
+fn no_name_of_a_device_ends_a_fleet_and_rows_without_one_are_no_device() {
+    let (folder, lake, out) = (TempDir::new().unwrap(), TempDir::new().unwrap(), TempDir::new().unwrap());
+    devices(folder.path());
+    let mut columns = rows_of(folder.path(), &[0, 1, 2]);
+    let long = "x".repeat(300);
+    let names = |name: &str| match name {
+        "unit-00" => "fleet.csv".to_owned(),
+        "unit-01" => long.clone(),
+        _ => String::new(),
+    };
+    let Values::Texts(cells) = &columns[0].1 else { panic!("no names") };
+    columns[0].1 = Values::Texts(cells.iter().map(names).collect());
+    let rows = length(&columns);
+    fs::write(lake.path().join("lake.parquet"), part(&columns, 0..rows)).unwrap();
+    let outcome = fleet(lake.path(), out.path());
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+    let facts = facts(out.path());
+    assert_eq!((&facts["answered"], &facts["refused"]), (&2.into(), &1.into()));
+    assert!(outcome.stdout.contains("rows have no `device`"), "{}", outcome.stdout);
+    assert!(out.path().join("fleet.csv").is_file() && out.path().join("fleet.csv-2/report.json").is_file());
+}
+
+fn length(columns: &[(String, Values)]) -> usize {
+    columns.first().map_or(0, |(_, values)| values.len())
+}
+
+#[test]
+fn fleets_at_once_into_one_folder_leave_what_one_alone_does() {
+    let (folder, alone) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    devices(folder.path());
+    for number in 3..DEVICES {
+        fs::remove_dir_all(folder.path().join(format!("unit-{number:02}"))).unwrap();
+    }
+    assert_eq!(fleet(folder.path(), alone.path()).status, 0);
+    let names = |folder: &Path| {
+        let mut all: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        all.sort();
+        all
+    };
+    for _ in 0..8 {
+        let beside = TempDir::new().unwrap();
+        let out = beside.path().join("out");
+        let at_once = || fleet(folder.path(), &out);
+        std::thread::scope(|scope| {
+            for program in [(); 3].map(|()| scope.spawn(at_once)) {
+                let outcome = program.join().unwrap();
+                assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+            }
+        });
+        assert_eq!(names(&out), names(alone.path()));
+        for name in ["fleet.csv", "fleet.json", "unit-00/report.json", "unit-02/calibration.toml"] {
+            assert!(fs::read(out.join(name)).unwrap() == fs::read(alone.path().join(name)).unwrap(), "{name}");
+        }
+        assert_eq!(names(beside.path()), ["out"]);
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::lake::{self, Member};
+use super::{PRIOR, SUMMARIES};
 use crate::commands::{RESULTS, Told};
 use crate::input::{Wanted, campaign, explained, files};
 use crate::limits::Limits;
@@ -102,7 +103,10 @@ pub(super) fn answered(sources: Vec<Source>, out: &Path, limits: Option<&Limits>
     Ok(all)
 }
 
-/// Folders of results, no two alike.
+/// Bytes of a folder's name: systems take 255, of which what is unfinished has some before it.
+const LONGEST: usize = 200;
+
+/// Folders of results: no two alike, also where a system takes capitals for small letters, and none in the place of a summary.
 #[derive(Default)]
 struct Folders(BTreeSet<String>);
 
@@ -121,11 +125,17 @@ impl Folders {
         self.free(if text.is_empty() { "device".to_owned() } else { text.to_owned() })
     }
 
-    /// The name, numbered where another has it.
-    fn free(&mut self, name: String) -> String {
+    /// The name, shortened where it is long and numbered where another has it.
+    fn free(&mut self, mut name: String) -> String {
+        while name.len() > LONGEST {
+            name.pop();
+        }
         let numbered = (2..).map(|again| format!("{name}-{again}"));
-        let free = std::iter::once(name.clone()).chain(numbered).find(|name| self.0.insert(name.clone()));
-        free.unwrap_or(name)
+        let is_free = |name: &String| {
+            let alike = name.to_lowercase();
+            !SUMMARIES.contains(&alike.as_str()) && alike != PRIOR && self.0.insert(alike)
+        };
+        std::iter::once(name.clone()).chain(numbered).find(is_free).unwrap_or(name)
     }
 }
 
@@ -205,6 +215,16 @@ mod tests {
         let mut folders = Folders::default();
         let names = paths.map(|path| folders.of_file(Path::new(path)));
         assert_eq!(names, ["unit", "unit-2", "unit-2-2", "unit-3", "unit-2-3"]);
+    }
+
+    #[test]
+    fn no_folder_is_another_to_any_system_nor_a_summary_nor_too_long() {
+        let mut folders = Folders::default();
+        let names = ["A", "a", "Fleet.CSV", "fleet-prior.csv"].map(|name| folders.of_name(name));
+        assert_eq!(names, ["A", "a-2", "Fleet.CSV-2", "fleet-prior.csv-2"]);
+        let long = "é".repeat(300);
+        let [one, two] = [folders.of_name(&long), folders.of_name(&format!("{long}x"))];
+        assert!(one.len() <= 200 && two == format!("{one}-2"), "{two}");
     }
 
     #[test]

@@ -57,12 +57,23 @@ impl Member {
 
     /// The campaign of the device.
     pub(super) fn campaign(mut self) -> Result<Campaign, Failure> {
+        if self.name.is_empty() {
+            let rows = self.columns.first().map_or(0, |(_, values)| values.len());
+            return Err(Failure::input(format!("{rows} rows have no `device`; wanted a name in each")));
+        }
         let (mut text, mut runs) = (format!("[campaign]\ndevice = {}\n", quoted(&self.name)), Vec::new());
         for word in OF_DEVICE {
             text.push_str(&said(&self.columns, word, &self.name)?);
         }
         let names = self.columns.iter().position(|(name, _)| name == RUN).map(|at| self.columns.remove(at).1);
         let rows = self.columns.first().map_or(0, |(_, values)| values.len());
+        // a column that says nothing is none
+        let unnamed = |names: &Values| (0..rows).filter(|row| cell(names, *row).is_empty()).count();
+        let names = names.filter(|names| unnamed(names) < rows);
+        if let Some(some) = names.as_ref().map(unnamed).filter(|some| *some > 0) {
+            let what = format!("{}: `run` says nothing in {some} of {rows} rows; wanted a name in each", self.name);
+            return Err(Failure::input(what));
+        }
         let name_of = |row: usize| names.as_ref().map_or("recording".to_owned(), |names| cell(names, row));
         let mut of_runs: Vec<(String, Vec<usize>)> = Vec::new();
         for row in 0..rows {

@@ -89,11 +89,13 @@ pub(super) fn neighbour(folder: &Path, name: &str) -> PathBuf {
 
 /// Waits until this program alone writes into a folder; `None` where the system has no such locks.
 pub(super) fn lock(folder: &Path) -> io::Result<Option<File>> {
-    let Ok(file) = File::open(folder) else { return Ok(None) };
     let begun = Instant::now();
     loop {
+        let Ok(file) = File::open(folder) else { return Ok(None) };
         match file.try_lock() {
-            Ok(()) => return Ok(Some(file)),
+            Ok(()) if is_at(&file, folder) => return Ok(Some(file)),
+            // another program has put its own in the place of the one that was opened
+            Ok(()) => {}
             Err(TryLockError::Error(_)) => return Ok(None),
             Err(TryLockError::WouldBlock) if begun.elapsed() > LONGEST_WAIT => {
                 return Err(io::Error::new(io::ErrorKind::WouldBlock, "another program is writing there"));
@@ -101,6 +103,30 @@ pub(super) fn lock(folder: &Path) -> io::Result<Option<File>> {
             Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(2)),
         }
     }
+}
+
+/// Whether an open folder is the one that has this name.
+#[cfg(unix)]
+fn is_at(file: &File, folder: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let identity = |metadata: io::Result<fs::Metadata>| metadata.ok().map(|m| (m.dev(), m.ino()));
+    identity(file.metadata()) == identity(fs::metadata(folder))
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Whether a program that lives writes a set of files within a folder. Only who has the folder locked is told for long.
+pub(super) fn is_written_into(folder: &Path) -> bool {
+    let Ok(entries) = fs::read_dir(folder) else { return false };
+    let is_alive =
+        |path: PathBuf| File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)));
+    entries
+        .flatten()
+        .filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED))
+        .any(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()) && is_alive(entry.path()))
 }
 
 /// Removes what programs began under this name and did not live to end: one that lives has its own locked. Only who has

@@ -98,6 +98,8 @@ impl Set {
             place::settle(path.parent().unwrap_or(&self.folder));
         }
         place::settle(&self.folder);
+        // who would begin a set within the folder waits, and looks for the new one then
+        let _within = if self.beside == self.out { None } else { place::lock(&self.out)? };
         if !self.out.exists() {
             fs::rename(&self.folder, &self.out)?;
         } else if !self.is_to_stay() && link_others(&self.out, &self.folder, &mut { MOST_LINKED }).unwrap_or(false) {
@@ -123,12 +125,16 @@ impl Set {
         self.gone.iter().try_for_each(|name| remove(&self.folder.join(name)))
     }
 
-    /// Whether the folder has to remain the one it is: the user stands in it, or it is another's.
+    /// Whether the folder has to remain the one it is: the user stands in it, it is another's, or another program has begun a set
+    /// within it.
     fn is_to_stay(&self) -> bool {
         let is_within = std::env::current_dir()
             .and_then(|here| Ok(here.canonicalize()?.starts_with(self.out.canonicalize()?)))
             .unwrap_or(true);
-        is_within || self.beside == self.out || !has_one_owner(&self.out, &self.folder)
+        is_within
+            || self.beside == self.out
+            || !has_one_owner(&self.out, &self.folder)
+            || place::is_written_into(&self.out)
     }
 
     /// Moves the files in one by one, after a mark that they are complete.

@@ -227,7 +227,10 @@ fn like(values: &Values) -> Values {
 fn texts(values: Values) -> Cells {
     match values {
         Values::Texts(cells) => cells,
-        Values::Numbers(numbers) => numbers.iter().map(f64::to_string).collect(),
+        // what is not there has no name
+        Values::Numbers(numbers) => {
+            numbers.iter().map(|v| if v.is_nan() { String::new() } else { v.to_string() }).collect()
+        }
         Values::Unreadable { rows, .. } => (0..rows).map(|_| "").collect(),
     }
 }
