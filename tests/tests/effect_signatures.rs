@@ -241,6 +241,16 @@ proptest! {
         prop_assert_near!(f.q_s, 0.5 * s * (1.0 + (2.0 * theta).cos()), 1e-14);
     }
 
+    /// What holds the quadrature pushes the pattern along by the sine of the phase, and the energy control has no part in it.
+    #[test]
+    fn prop_a_phase_of_the_drives_turns_what_holds_the_quadrature(phase in small(), v_qc in -1.0..1.0_f64, theta in angles()) {
+        let commanded = ActuationGains { x: 1.0, y: 1.0 }.axis_forces(&ControlOutputs { v_as: 0.0, v_qc }, theta);
+        let held = commanded.along_orbit(theta).q_c;
+        let f = EffectId::ActuationPhase.actuate(&values(&[phase]), commanded).along_orbit(theta);
+        prop_assert_near!(f.q_s, -phase * held, 1e-9);
+        prop_assert_near!(f.a_s, 0.0, 1e-14);
+    }
+
     /// θ̇ = −kΩ0(1 + w cos(nα + phase)) with α̇ = Ω0 integrates to −(kw/n) sin(nα + phase).
     #[test]
     fn prop_table_ripple_follows_the_table_and_not_the_pattern(

@@ -11,7 +11,7 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 21] = [
+const IDS: [&str; 22] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
@@ -23,6 +23,7 @@ const IDS: [&str; 21] = [
     "temperature",
     "actuation-gain-mismatch",
     "actuation-skew",
+    "actuation-phase",
     "anisodamping",
     "anisoelasticity",
     "spring-cubic",

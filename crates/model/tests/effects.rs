@@ -37,6 +37,11 @@ fn drives_act_on_both_phases_alike() {
     assert_eq!(uneven, AxisForces { x_c: 1.0, x_s: -4.0, y_c: 1.5, y_s: 0.125 });
     let skewed = EffectId::ActuationSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f);
     assert_eq!(skewed, AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.25, y_s: -0.75 });
+    // a quarter of a turn: F_s + iF_c becomes −F_c + iF_s
+    let late = EffectId::ActuationPhase.actuate(&[core::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0], f);
+    for (got, expected) in [(late.x_c, -2.0), (late.x_s, -0.5), (late.y_c, 0.25), (late.y_s, -3.0)] {
+        assert!((got - expected).abs() < 1e-15, "{late:?}");
+    }
     assert_eq!(EffectId::DetectionSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f), f, "a readout makes no forces");
 }
 

@@ -34,6 +34,7 @@ fn linear_effects() -> Vec<Setting> {
         (EffectId::Anisoelasticity, [2.0, 1.5, 0.0, 0.0]),
         (EffectId::ActuationGainMismatch, [1.05, 0.0, 0.0, 0.0]),
         (EffectId::ActuationSkew, [0.1, 0.0, 0.0, 0.0]),
+        (EffectId::ActuationPhase, [0.05, 0.0, 0.0, 0.0]),
     ]
 }
 
@@ -116,7 +117,10 @@ fn effects_are_sorted_by_what_they_do() {
     assert_eq!(ids(&stages.nonlinear), [EffectId::SpringCubic]);
     assert_eq!(ids(&stages.table), [EffectId::TableHarmonic]);
     assert_eq!(ids(&stages.input), [EffectId::ScaleDrift]);
-    assert_eq!(ids(&stages.actuation), [EffectId::ActuationGainMismatch, EffectId::ActuationSkew]);
+    assert_eq!(
+        ids(&stages.actuation),
+        [EffectId::ActuationGainMismatch, EffectId::ActuationSkew, EffectId::ActuationPhase]
+    );
 }
 
 #[test]

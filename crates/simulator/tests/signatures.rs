@@ -140,6 +140,20 @@ fn anisoelasticity_is_a_sine_of_2_theta_in_the_quadrature_command() {
 }
 
 #[test]
+fn actuation_phase_turns_the_pattern_by_what_holds_the_split() {
+    let axis = 20_f64.to_radians();
+    let split = r#"{ id = "anisoelasticity", anisoelasticity = 0.25, theta_omega = 20.0 }"#;
+    for rate in [20.0, -20.0, 10.0] {
+        let second = |effects: &str| angle_harmonics(&rotation(effects, rate, 120.0), &[2.0, 4.0])[0];
+        let late = second(&format!(r#"{split}, {{ id = "actuation-phase", actuation_phase = 0.02 }}"#));
+        let plain = second(split);
+        let expected = 0.02 * 0.25 / (4.0 * k_omega(rate));
+        close(late.cos - plain.cos, expected * (2.0 * axis).cos());
+        close(late.sin - plain.sin, expected * (2.0 * axis).sin());
+    }
+}
+
+#[test]
 fn detection_phase_turns_the_pattern_through_a_split_at_4_theta() {
     let axis = 20_f64.to_radians();
     let split = r#"{ id = "anisoelasticity", anisoelasticity = 0.25, theta_omega = 20.0 }"#;

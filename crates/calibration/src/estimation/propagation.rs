@@ -89,7 +89,8 @@ pub(crate) fn propagate(
     // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
     let mut integrals = Integrals::new(2 * (n + 1));
     let mut held = Held::default();
-    let mut excess = Jet::constant(0.0);
+    // for each group of lanes; the value is that of all
+    let mut excess = vec![Jet::constant(0.0); unknowns.input.len()];
     // what the input effects added before the segment: the table's angle is 0 where the recording starts
     let mut ahead = 0.0;
     let mut integrands = vec![0.0; 2 * (n + 1)];
@@ -101,7 +102,7 @@ pub(crate) fn propagate(
     if harmonic > 0.0 {
         let before: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
         for step in before.windows(2) {
-            ahead += excess_angle(track, (step[0], ahead), step[1], &predictor, harmonic).value;
+            ahead += excess_angle(track, (step[0], ahead), step[1], (&predictor, 0), harmonic).value;
         }
     }
     let mut last: Option<usize> = None;
@@ -119,11 +120,14 @@ pub(crate) fn propagate(
             }
         }
         if let Some(from) = last.filter(|_| harmonic > 0.0) {
-            excess = excess + excess_angle(track, (from, ahead + excess.value), i, &predictor, harmonic);
+            for (lanes, excess) in excess.iter_mut().enumerate() {
+                let before = (from, ahead + excess.value);
+                *excess = *excess + excess_angle(track, before, i, (&predictor, lanes), harmonic);
+            }
         }
         last = Some(i);
         let turned = track.input_rad[i] - zero_input;
-        let input = turned + excess.value;
+        let input = turned + excess.first().map_or(0.0, |excess| excess.value);
         let along = start.angle
             + start.drift * (track.t_s[i] - track.t_s[segment.range.start])
             + sense * hypothesis.angular_gain * input;
@@ -148,8 +152,10 @@ pub(crate) fn propagate(
         if let Some(k) = unknowns.angular_gain {
             angle_slopes[k] = sense * input;
         }
-        for (lane, &u) in unknowns.input.columns.iter().enumerate() {
-            angle_slopes[u] = sense * hypothesis.angular_gain * excess.slope[lane];
+        for (lanes, excess) in unknowns.input.iter().zip(&excess) {
+            for (lane, &u) in lanes.columns.iter().enumerate() {
+                angle_slopes[u] = sense * hypothesis.angular_gain * excess.slope[lane];
+            }
         }
         take(&Row {
             index: i,
@@ -170,14 +176,14 @@ pub(crate) fn propagate(
 /// Largest step of the table's harmonic within one quadrature interval, rad.
 const LARGEST_PHASE_STEP: f64 = 0.5;
 
-/// The input angle that the input effects add between two samples, rad, with slopes: two-point Gauss quadrature on
+/// The input angle that the input effects add between two samples, rad, with slopes against a group of lanes: two-point Gauss quadrature on
 /// pieces over which the table's harmonic turns little. Between samples the table turns evenly but for what the effects
 /// add, `excess` up to the first of them: a ripple of the rate goes by the angle that it made itself.
 fn excess_angle(
     track: &Track,
     (from, excess): (usize, f64),
     to: usize,
-    predictor: &Predictor<'_>,
+    (predictor, lanes): (&Predictor<'_>, usize),
     harmonic: f64,
 ) -> Jet {
     let (t0, t1) = (track.t_s[from], track.t_s[to]);
@@ -197,7 +203,7 @@ fn excess_angle(
                 warmer_k: (1.0 - s) * track.warmer_k(from) + s * track.warmer_k(to),
                 ..Moment::default()
             };
-            sum = sum + predictor.excess_rate(rate, &at);
+            sum = sum + predictor.excess_rate(rate, &at, lanes);
         }
     }
     sum * Jet::constant(0.5 * h * (t1 - t0))
@@ -351,7 +357,10 @@ mod tests {
         (hypothesis.damping_per_s, hypothesis.control_latency_s) = (0.06, 1e-3);
         let values = [
             (EffectId::DetectionGainMismatch, 0, 1.05),
+            // with the latency more unknowns of the drive than lanes
             (EffectId::ActuationGainMismatch, 0, 0.96),
+            (EffectId::ActuationSkew, 0, 0.02),
+            (EffectId::ActuationPhase, 0, 0.03),
             (EffectId::Anisodamping, 0, 0.01),
             (EffectId::Anisoelasticity, 1, 0.2),
         ];

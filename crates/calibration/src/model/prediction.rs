@@ -61,10 +61,12 @@ pub(crate) struct Predictor<'h> {
     /// columns of mechanics unknowns, and the effect with a one in that place: mechanics are linear
     units: Vec<(usize, EffectId, Values<f64>)>,
     actuation: Drive<f64>,
-    actuation_of_jets: Drive<Jet>,
-    /// of unit scale: what a loop does that nobody recorded
-    loops: Drive<Jet>,
-    input: Chain<Jet>,
+    /// for each group of lanes
+    actuation_of_jets: Vec<Drive<Jet>>,
+    /// the same of unit scale: what a loop does that nobody recorded
+    loops: Vec<Drive<Jet>>,
+    /// for each group of lanes
+    input: Vec<Chain<Jet>>,
 }
 
 /// What makes forces of commands.
@@ -90,12 +92,12 @@ impl<'h> Predictor<'h> {
             }
             _ => None,
         };
-        let lanes = &unknowns.forcing;
-        let drive = |force_scale| Drive {
+        let drive = |lanes: &Lanes, force_scale| Drive {
             force_scale,
             control_latency_s: lanes.jet(hypothesis.control_latency_s, lanes.control_latency),
             effects: jets(Stage::Actuation, lanes),
         };
+        let forcing = unknowns.forcing.iter();
         Self {
             hypothesis,
             unknowns,
@@ -112,9 +114,12 @@ impl<'h> Predictor<'h> {
                 control_latency_s: hypothesis.control_latency_s,
                 effects: plain(Stage::Actuation),
             },
-            actuation_of_jets: drive(lanes.jet(hypothesis.force_scale, lanes.force_scale)),
-            loops: drive(Jet::constant(1.0)),
-            input: jets(Stage::Input, &unknowns.input),
+            actuation_of_jets: forcing
+                .clone()
+                .map(|lanes| drive(lanes, lanes.jet(hypothesis.force_scale, lanes.force_scale)))
+                .collect(),
+            loops: forcing.map(|lanes| drive(lanes, Jet::constant(1.0))).collect(),
+            input: unknowns.input.iter().map(|lanes| jets(Stage::Input, lanes)).collect(),
         }
     }
 
@@ -132,19 +137,11 @@ impl<'h> Predictor<'h> {
         let recorded = commands.is_some();
         out.slopes.clear();
         out.slopes.resize(unknowns.all.len(), [0.0; 5]);
-        let lanes = &unknowns.forcing;
-        let commands = commands.filter(|_| hypothesis.force_scale != 0.0 || !lanes.columns.is_empty());
-        let seen_axis = commands.map(|_| major_axis(&seen, &seen.pendulum()));
-        let (mut forced, mut forced_slopes) = (None, None);
-        if let Some((v, axis)) = commands.zip(seen_axis) {
-            if lanes.columns.is_empty() {
-                forced = Some(self.actuation.rate(&v, &axis, |x| x));
-            } else {
-                let rate = self.actuation_of_jets.rate(&v, &axis, Jet::constant);
-                forced = Some(part(&rate, |j| j.value));
-                forced_slopes = Some(rate);
-            }
-        }
+        let drives =
+            unknowns.forcing.iter().zip(&self.actuation_of_jets).filter(|(lanes, _)| !lanes.columns.is_empty());
+        let commands = commands.filter(|_| hypothesis.force_scale != 0.0 || drives.clone().next().is_some());
+        let driven = commands.map(|v| (v, major_axis(&seen, &seen.pendulum())));
+        let forced = driven.as_ref().map(|(v, axis)| self.actuation.rate(v, axis, |x| x));
         let mechanical = hypothesis.instrument == Instrument::Gyroscope;
         let mut z = Envelope::zero();
         if self.readout.is_empty() {
@@ -194,11 +191,14 @@ impl<'h> Predictor<'h> {
             out.theta_rate += turn;
             out.growth += grow;
         }
-        if let Some(rate) = forced_slopes {
-            for (lane, &i) in lanes.columns.iter().enumerate() {
-                let (turn, grow) = gradient.along(&part(&rate, |j| j.slope[lane]));
-                out.slopes[i][THETA_RATE] += turn;
-                out.slopes[i][GROWTH] += grow;
+        if let Some((v, axis)) = driven {
+            for (lanes, drive) in drives {
+                let rate = drive.rate(&v, &axis, Jet::constant);
+                for (lane, &i) in lanes.columns.iter().enumerate() {
+                    let (turn, grow) = gradient.along(&part(&rate, |j| j.slope[lane]));
+                    out.slopes[i][THETA_RATE] += turn;
+                    out.slopes[i][GROWTH] += grow;
+                }
             }
         }
     }
@@ -211,12 +211,13 @@ impl<'h> Predictor<'h> {
         use quantity::{GROWTH, STEERING, THETA, THETA_RATE};
         let still = ControlOutputs { v_as: 0.0, v_qc: 0.0 };
         let axis = major_axis(seen, &seen.pendulum());
-        let unit = |now| {
+        let unit = |drive: &Drive<Jet>, now| {
             let held = Commands { now, change_per_s: still, turn_rad_s: at.precession_rad_s };
-            self.loops.rate(&held, &axis, Jet::constant)
+            drive.rate(&held, &axis, Jet::constant)
         };
-        let energy = unit(ControlOutputs { v_as: 1.0, ..still });
-        let quadrature = part(&unit(ControlOutputs { v_qc: 1.0, ..still }), |j| j.value);
+        let energies = self.loops.iter().map(|drive| unit(drive, ControlOutputs { v_as: 1.0, ..still }));
+        let Some((first, energy)) = self.loops.first().zip(energies.clone().next()) else { return };
+        let quadrature = part(&unit(first, ControlOutputs { v_qc: 1.0, ..still }), |j| j.value);
         let along = part(&energy, |j| j.value);
         let ((turn, grow), (turn_q, grow_q)) = (gradient.along(&along), gradient.along(&quadrature));
         let (widen, widen_q) = (gradient.widening(&along), gradient.widening(&quadrature));
@@ -227,9 +228,11 @@ impl<'h> Predictor<'h> {
         for slope in &mut out.slopes {
             slope[STEERING] = -slope[THETA];
         }
-        for (lane, &i) in self.unknowns.forcing.columns.iter().enumerate() {
-            let (turned, grown) = gradient.along(&part(&energy, |j| j.slope[lane]));
-            out.slopes[i][STEERING] = (turned - by_growth * grown) / grow;
+        for (lanes, energy) in self.unknowns.forcing.iter().zip(energies) {
+            for (lane, &i) in lanes.columns.iter().enumerate() {
+                let (turned, grown) = gradient.along(&part(&energy, |j| j.slope[lane]));
+                out.slopes[i][STEERING] = (turned - by_growth * grown) / grow;
+            }
         }
         let widened: f64 =
             self.mechanics.iter().map(|(id, v)| gradient.widening(&id.mechanics(v, &out.envelope))).sum();
@@ -248,10 +251,11 @@ impl<'h> Predictor<'h> {
         self.mechanics_of_jets.iter().fold(start, |sum, (id, values)| sum + id.mechanics(values, z))
     }
 
-    /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes.
-    pub(crate) fn excess_rate(&self, rate_rad_s: f64, at: &Moment<f64>) -> Jet {
+    /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes against group `lanes` of
+    /// the input parameters.
+    pub(crate) fn excess_rate(&self, rate_rad_s: f64, at: &Moment<f64>, lanes: usize) -> Jet {
         let (at, nominal) = (at.map(Jet::constant), Jet::constant(rate_rad_s));
-        self.input.iter().fold(nominal, |rate, (id, values)| id.input_rate(values, rate, &at)) - nominal
+        self.input[lanes].iter().fold(nominal, |rate, (id, values)| id.input_rate(values, rate, &at)) - nominal
     }
 }
 

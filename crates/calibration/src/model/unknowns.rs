@@ -51,10 +51,10 @@ pub(crate) struct Unknowns {
     pub(crate) readout: Vec<Lanes>,
     /// columns of mechanics parameters
     pub(crate) mechanics: Vec<usize>,
-    /// force scale, control latency and actuation parameters
-    pub(crate) forcing: Lanes,
-    /// input parameters
-    pub(crate) input: Lanes,
+    /// force scale, control latency and actuation parameters, in groups of lanes: one without columns where there are none
+    pub(crate) forcing: Vec<Lanes>,
+    /// input parameters, in the same way
+    pub(crate) input: Vec<Lanes>,
     /// column of k
     pub(crate) angular_gain: Option<usize>,
     /// column of 1/τ
@@ -73,12 +73,16 @@ impl Unknowns {
                 .collect()
         };
         let members = hypothesis.members.len();
-        let single = |columns: &[usize]| Lanes::new(&columns[..columns.len().min(LANES)], &all, members);
+        let groups =
+            |columns: &[usize]| -> Vec<Lanes> { columns.chunks(LANES).map(|c| Lanes::new(c, &all, members)).collect() };
+        let one_at_least = |columns: &[usize]| {
+            if columns.is_empty() { vec![Lanes::new(columns, &all, members)] } else { groups(columns) }
+        };
         Self {
-            readout: at(Stage::Readout).chunks(LANES).map(|c| Lanes::new(c, &all, members)).collect(),
+            readout: groups(&at(Stage::Readout)),
             mechanics: at(Stage::Mechanics),
-            forcing: single(&at(Stage::Actuation)),
-            input: single(&at(Stage::Input)),
+            forcing: one_at_least(&at(Stage::Actuation)),
+            input: one_at_least(&at(Stage::Input)),
             angular_gain: all.iter().position(|u| *u == Unknown::AngularGain),
             damping: all.iter().position(|u| *u == Unknown::Damping),
             all,

@@ -12,6 +12,7 @@
 use crate::{AxisForces, Envelope, Real};
 
 pub mod actuation_gain_mismatch;
+pub mod actuation_phase;
 pub mod actuation_skew;
 pub mod angle_latency;
 pub mod anisodamping;
@@ -546,6 +547,7 @@ library! {
     SpringCubic => spring_cubic::SpringCubic,
     ActuationGainMismatch => actuation_gain_mismatch::ActuationGainMismatch,
     ActuationSkew => actuation_skew::ActuationSkew,
+    ActuationPhase => actuation_phase::ActuationPhase,
     HarmonicN => harmonic_n::HarmonicN,
     TimePeriodic => time_periodic::TimePeriodic,
     AngleLatency => angle_latency::AngleLatency,
