@@ -20,6 +20,7 @@ use crate::selection::candidates::candidates;
 use crate::selection::consistency::{ask_every_run, in_its_place, rival_that_explains};
 use crate::selection::pairs::best_pair;
 use crate::selection::step::{Step, member_of, step_of};
+use crate::selection::together::all_together;
 use crate::selection::trial::{
     Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_HELDOUT_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK,
     REFUTED, Trial, balance, count, extend, extend_from, heldout, mean_square, on_heldout, price, refit, restore,
@@ -49,9 +50,14 @@ pub(crate) fn discover(
             continue;
         }
         restore(dataset, &mut fitted)?;
-        let Some((next, pair)) = best_pair(dataset, &fitted)? else { break };
-        fitted = next;
-        steps.extend(pair);
+        if let Some((next, pair)) = best_pair(dataset, &fitted)? {
+            fitted = next;
+            steps.extend(pair);
+            continue;
+        }
+        restore(dataset, &mut fitted)?;
+        let Some((next, all)) = all_together(dataset, &fitted, &steps)? else { break };
+        (fitted, steps) = (next, all);
     }
     restore(dataset, &mut fitted)?;
     drop_weak(dataset, &mut fitted, &mut steps)?;
@@ -228,7 +234,7 @@ fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, V
 }
 
 /// Drops effects whose place the final data does not support.
-fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Step>) -> Result<(), Refusal> {
+pub(super) fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Step>) -> Result<(), Refusal> {
     if steps.len() < 2 {
         return Ok(());
     }

@@ -6,4 +6,5 @@ pub(crate) mod discovery;
 pub(crate) mod last_step;
 mod pairs;
 pub(crate) mod step;
+mod together;
 mod trial;

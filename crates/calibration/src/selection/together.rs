@@ -1,0 +1,120 @@
+//! Causes that hide each other: where single effects and pairs end above the noise, all causes that the campaign could name are
+//! fitted together, and what the others do without leaves again, the weakest first (backward elimination).
+//!
+//! Adding the best effect, one at a time, goes astray where half a dozen of one size are missing: under each of them the residual
+//! keeps the others' memory, in which samples are worth little, and what takes a share of several at once looks like the cause.
+//! So many parameters describe much that is none of them: they are believed only where they leave nothing but noise.
+
+use cvg_model::effects::Role as ParameterRole;
+
+use crate::diagnostics::evaluate::evaluate;
+use crate::diagnostics::residual::pattern_harmonics;
+use crate::error::Refusal;
+use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
+use crate::estimation::residuals::Window;
+use crate::model::hypothesis::{Hypothesis, Origin};
+use crate::recording::Role;
+use crate::selection::candidates::{Candidate, candidates};
+use crate::selection::discovery::drop_weak;
+use crate::selection::step::Step;
+use crate::selection::trial::{
+    Before, CAREFUL, Distinguishable, NOTHING_LEFT, QUICK, REFUTED, balance, count, extend, floor, heldout,
+    mean_square, on_heldout, refit,
+};
+
+/// Fits of everything, each from where the last one ended.
+const FITS: usize = 3;
+/// Causes of more parameters than this come in where those of fewer are not enough.
+const SIMPLE: usize = 2;
+
+/// The causes that explain all that single steps left, with what remains of `steps`; none where they leave more than noise.
+///
+/// # Errors
+/// As for the fit.
+pub(super) fn all_together(
+    dataset: &mut Dataset,
+    fitted: &Fitted,
+    steps: &[Step],
+) -> Result<Option<(Fitted, Vec<Step>)>, Refusal> {
+    let apart = Distinguishable::on(dataset);
+    let driven = dataset.tracks.iter().all(|t| t.track.records_the_loops());
+    if dataset.excess() < NOTHING_LEFT || !apart.rates || !driven {
+        return Ok(None);
+    }
+    let before_it = Before::of(dataset, &fitted.fit);
+    let balance_before = balance(dataset, &fitted.fit);
+    for most in [SIMPLE, usize::MAX] {
+        let Some((mut next, mut came)) = everything(dataset, fitted, most)? else { continue };
+        drop_weak(dataset, &mut next, &mut came)?;
+        let left = on_heldout(dataset, &next.fit).mean_square();
+        let refuted =
+            balance_before.zip(balance(dataset, &next.fit)).is_some_and(|(before, after)| after > REFUTED * before);
+        // the same causes again would go in circles
+        let anew = came.iter().any(|c| steps.iter().all(|s| s.id != c.id));
+        if anew && !refuted && is_noise(dataset, &next) && before_it.is_improved_by(left) {
+            return Ok(Some((next, came)));
+        }
+    }
+    Ok(None)
+}
+
+/// The declared model with every cause of at most `most` parameters, where that leaves noise.
+fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Option<(Fitted, Vec<Step>)>, Refusal> {
+    let mut declared = fitted.fit.hypothesis.clone();
+    // what came in before stands for what was missing then
+    declared.members.retain(|m| m.origin == Origin::Declared);
+    let causes: Vec<Candidate> = causes(dataset, &declared, fitted)
+        .into_iter()
+        .filter(|c| c.id.description().parameters.len() <= most)
+        .collect();
+    let all = causes.iter().fold(declared, |h, cause| extend(&h, cause, Origin::Discovered));
+    let begun = refit(dataset, fitted, &all, QUICK);
+    let mut hypothesis = refit(dataset, fitted, &begun.hypothesis, CAREFUL).hypothesis;
+    for _ in 0..FITS {
+        let next = fit_with_ring_downs(dataset, &hypothesis)?;
+        if is_noise(dataset, &next) {
+            let came = causes.iter().map(|cause| step(dataset, cause, [fitted, &next])).collect();
+            return Ok(Some((next, came)));
+        }
+        hypothesis = next.fit.hypothesis;
+    }
+    Ok(None)
+}
+
+fn is_noise(dataset: &Dataset, fitted: &Fitted) -> bool {
+    heldout(dataset, &fitted.fit) <= (NOTHING_LEFT * floor(dataset, &fitted.fit)).powi(2)
+}
+
+/// One of the causes that came in together: what they gained, they gained together.
+fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2]) -> Step {
+    let evaluations = [before, after].map(|f| on_heldout(dataset, &f.fit));
+    let balances = [before, after].map(|f| balance(dataset, &f.fit).map(f64::sqrt));
+    Step {
+        id: cause.id,
+        origin: Origin::Discovered,
+        gain: count(&after.fit) * (mean_square(&before.fit) / mean_square(&after.fit)).ln(),
+        rivals: Vec::new(),
+        heldout_rms_deg: evaluations.each_ref().map(|e| e.mean_square().sqrt().to_degrees()),
+        heldout: evaluations[1].size(),
+        harmonics: pattern_harmonics(&evaluations[1]),
+        confounded_with: Vec::new(),
+        energy_balance: balances[0].zip(balances[1]).map(|(before, after)| [before, after]),
+        inconsistency: None,
+        contradicted: false,
+    }
+}
+
+/// Every cause that the campaign could name and that no search has to place, unless it is in already.
+fn causes(dataset: &Dataset, hypothesis: &Hypothesis, fitted: &Fitted) -> Vec<Candidate> {
+    let apart = Distinguishable::on(dataset);
+    let left = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+    let placed = |c: &Candidate| {
+        let parameters = c.id.description().parameters;
+        parameters.iter().any(|p| matches!(p.role, ParameterRole::Searched(_) | ParameterRole::Located(_)))
+    };
+    candidates(dataset, hypothesis, &left, &left)
+        .into_iter()
+        .filter(|c| c.refine.is_none() && !placed(c) && c.id.description().onsets.is_empty())
+        .filter(|c| !c.id.description().empirical && apart.can_be_named(c))
+        .collect()
+}
