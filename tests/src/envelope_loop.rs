@@ -279,7 +279,8 @@ impl<'a, T: Float> Loop<'a, T> {
         self.quadrature += p.q * dt;
         let forward = self.calibrator.forward(&self.state, own(cos), own(sin), own(1.0));
         let v_qc = -8.0 * (p.q + self.quadrature / 0.5) + forward.quadrature_v.to_f64();
-        let v_qs = forward.precession_v.to_f64() - self.asked_rad_s;
+        // what doesn't learn doesn't precess for it either
+        let v_qs = if learning { forward.precession_v.to_f64() } else { 0.0 } - self.asked_rad_s;
         self.phase += p.l * 200.0 * dt;
         let ahead = 40.0 * p.l + self.phase - forward.detuning_rad_s.to_f64();
         let wanted = AxisForces {
@@ -322,7 +323,8 @@ impl<'a, T: Float> Loop<'a, T> {
     }
 }
 
-/// Rms of harmonics 1 to 8 of the angle's error, deg, at a constant rate.
+/// Rms of harmonics 1 to 8 of the pattern's angle in the error of the rotation, deg, at a constant rate, with what is in force and
+/// no precession of its own.
 pub fn bias_deg<T: Float>(device: &Device, state: &State<T>, corrected: bool, rate_deg_s: f64, seconds: f64) -> f64 {
     let mut run = Loop::<T>::new(device, 77, &Settings::default());
     run.state = *state;
@@ -339,6 +341,7 @@ pub fn bias_deg<T: Float>(device: &Device, state: &State<T>, corrected: bool, ra
     harmonics_rms(&series)
 }
 
+/// Of (time, angle of the pattern, rotation).
 fn harmonics_rms(series: &[(f64, f64, f64)]) -> f64 {
     const H: usize = 8;
     const M: usize = 2 + 2 * H;
@@ -367,30 +370,24 @@ fn harmonics_rms(series: &[(f64, f64, f64)]) -> f64 {
         }
         (0..m).map(|i| a[i][m] / a[i][i]).collect()
     };
-    let t0 = series[series.len() / 2].0;
-    let o0 = series[series.len() / 2].2;
-    let first = line(&|i| vec![series[i].0 - t0, 1.0, series[i].2 - o0], series.len(), 2);
-    let mut base = vec![first[0], first[1]];
-    let mut fit = Vec::new();
-    for _ in 0..2 {
-        let b = base.clone();
-        fit = line(
-            &|i| {
-                let t = series[i].0 - t0;
-                let theta = b[0] * t + b[1] + o0;
-                let mut row = vec![t, 1.0];
-                for k in 1..=H {
-                    let (s, c) = (k as f64 * theta).sin_cos();
-                    row.push(c);
-                    row.push(s);
-                }
-                row.push(series[i].2 - o0);
-                row
-            },
-            series.len(),
-            M,
-        );
-        base = fit[..2].to_vec();
-    }
+    let (t0, pattern0, rotation0) = series[series.len() / 2];
+    let first = line(&|i| vec![series[i].0 - t0, 1.0, series[i].1 - pattern0], series.len(), 2);
+    // harmonics of the pattern's angle, as far as it turns evenly
+    let fit = line(
+        &|i| {
+            let t = series[i].0 - t0;
+            let theta = first[0] * t + first[1] + pattern0;
+            let mut row = vec![t, 1.0];
+            for k in 1..=H {
+                let (s, c) = (k as f64 * theta).sin_cos();
+                row.push(c);
+                row.push(s);
+            }
+            row.push(series[i].2 - rotation0);
+            row
+        },
+        series.len(),
+        M,
+    );
     (0.5 * fit[2..].iter().map(|v| v * v).sum::<f64>()).sqrt().to_degrees()
 }
