@@ -109,7 +109,7 @@ fn numbers(array: &dyn Array) -> Option<Vec<f64>> {
         }
         DataType::Float64 => from!(number::Float64Type, |v| v),
         DataType::Float32 => from!(number::Float32Type, f64::from),
-        DataType::Float16 => from!(number::Float16Type, |v| v.to_f64()),
+        DataType::Float16 => from!(number::Float16Type, f64::from),
         DataType::Int8 => from!(number::Int8Type, f64::from),
         DataType::Int16 => from!(number::Int16Type, f64::from),
         DataType::Int32 => from!(number::Int32Type, f64::from),
