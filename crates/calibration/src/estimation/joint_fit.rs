@@ -61,6 +61,8 @@ pub(crate) struct Dataset {
     pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
     pub(crate) drive_is_free: bool,
+    /// fits begin with it free and where the hypothesis has it: nothing is missing that would drag it along
+    pub(crate) drive_is_free_at_once: bool,
     /// which runs are in, and which were left out and why
     pub(crate) screen: Screen,
 }
@@ -130,6 +132,7 @@ impl Dataset {
             energy_balance: None,
             quadrature_balance: None,
             drive_is_free: false,
+            drive_is_free_at_once: false,
             screen,
         })
     }
@@ -445,7 +448,9 @@ const SAME_NOISE: f64 = 1.5;
 pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis) -> Result<Fitted, Refusal> {
     let mut hypothesis = hypothesis.clone();
     hypothesis.control_latency_s = 0.0;
-    if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
+    if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch)
+        && !dataset.drive_is_free_at_once
+    {
         hypothesis.set(Unknown::Effect(member, 0), 1.0);
     }
     let mut explains = None;
@@ -469,8 +474,8 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         dataset.balance_quadrature(&hypothesis);
         dataset.begin_with_the_balance(&mut hypothesis);
         let last = round + 1 >= ROUNDS;
-        dataset.drive_is_free =
-            last && dataset.tells_the_drive() && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
+        let freed = last && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
+        dataset.drive_is_free = dataset.tells_the_drive() && (dataset.drive_is_free_at_once || freed);
         let (result, settled) =
             dataset.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
         hypothesis = result.hypothesis.clone();

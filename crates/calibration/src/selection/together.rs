@@ -43,6 +43,8 @@ pub(super) fn all_together(
     }
     let before_it = Before::of(dataset, &fitted.fit);
     let balance_before = balance(dataset, &fitted.fit);
+    // unequal drives are one more cause
+    dataset.drive_is_free_at_once = true;
     for most in [SIMPLE, usize::MAX] {
         let Some((mut next, mut came)) = everything(dataset, fitted, most)? else { continue };
         drop_weak(dataset, &mut next, &mut came)?;
@@ -55,6 +57,7 @@ pub(super) fn all_together(
             return Ok(Some((next, came)));
         }
     }
+    dataset.drive_is_free_at_once = false;
     Ok(None)
 }
 
@@ -68,6 +71,7 @@ fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Opt
         .filter(|c| c.id.description().parameters.len() <= most)
         .collect();
     let all = causes.iter().fold(declared, |h, cause| extend(&h, cause, Origin::Discovered));
+    dataset.drive_is_free = dataset.tells_the_drive();
     let begun = refit(dataset, fitted, &all, QUICK);
     let mut hypothesis = refit(dataset, fitted, &begun.hypothesis, CAREFUL).hypothesis;
     for _ in 0..FITS {
