@@ -359,8 +359,8 @@ mod tests {
             (EffectId::DetectionGainMismatch, 0, 1.05),
             // with the latency more unknowns of the drive than lanes
             (EffectId::ActuationGainMismatch, 0, 0.96),
-            (EffectId::ActuationSkew, 0, 0.02),
-            (EffectId::ActuationPhase, 0, 0.03),
+            (EffectId::ActuationSkew, 0, 0.002),
+            (EffectId::ActuationPhase, 0, 0.003),
             (EffectId::Anisodamping, 0, 0.01),
             (EffectId::Anisoelasticity, 1, 0.2),
         ];

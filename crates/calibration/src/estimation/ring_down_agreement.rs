@@ -79,6 +79,10 @@ impl Dataset {
                 ));
             }
         }
+        if odd.len() == all.len() {
+            // the rotations may be what is odd: beside a large split they take more
+            odd.clear();
+        }
         if odd.is_empty() && known == Anisodamping::Fitted && self.tracks_differ() {
             odd = contradictions(&all, hypothesis, usual);
         }
