@@ -610,31 +610,3 @@ fn a_jump_in_a_run_of_a_rate_gyroscope_is_named_and_left_out() {
         assert!(report.warnings.iter().any(is_said), "{said}: {:?}", report.warnings);
     }
 }
-
-/// Whatever sign the campaign states: how far and which way the angle went with its reference is the recording's to say.
-#[test]
-fn the_sign_of_the_angular_gain_is_that_of_the_recording_and_a_stated_one_that_is_not_is_named() {
-    for gain in [4.0, -4.0] {
-        let angles: Vec<f64> = (0..6000).map(|i| f64::from(i) * 0.2).collect();
-        let electrical: Vec<f64> = angles.iter().map(|a| gain * a).collect();
-        let (x, y) = channels(&electrical, 1.0132, 0.0, 1e-4, 5);
-        let recording = Recording {
-            t_s: (0..6000).map(|i| f64::from(i) * 0.01).collect(),
-            table_deg: Some(angles),
-            xc_v: Some(x),
-            yc_v: Some(y),
-            ..Recording::default()
-        };
-        let stated: [(Option<f64>, Option<f64>); 5] =
-            [(Some(4.0), None), (None, Some(4.0)), (None, Some(-4.0)), (Some(4.0), Some(1.0)), (Some(4.0), Some(-1.0))];
-        for (pole_pairs, angular_gain) in stated {
-            let runs = vec![run("poles.csv", Role::Fit, recording.clone())];
-            let i = identified(Campaign { pole_pairs, angular_gain, ..sensor(runs) });
-            let k = i.report.angular_gain.value;
-            assert!((k - gain).abs() < 1e-9, "{gain} with {pole_pairs:?} and {angular_gain:?}: {k}");
-            assert_eq!(i.calibration.hypothesis.precession(1.0), gain, "{pole_pairs:?} and {angular_gain:?}");
-            let named = i.report.warnings.iter().any(|w| w.contains("counts the other way than the campaign states"));
-            assert_eq!(named, angular_gain.is_some_and(|s| s * gain < 0.0), "{:?}", i.report.warnings);
-        }
-    }
-}

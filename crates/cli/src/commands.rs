@@ -287,8 +287,8 @@ pub(crate) fn summary(identified: &Identification) -> String {
     s
 }
 
-/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn; where
-/// the campaign states one it counts with it. `sense` is −1 as in Equation 1.
+/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn; k has
+/// the sign that the campaign states, and `sense` is what was seen: −1 as in Equation 1.
 fn pole_pairs(k: f64, sense: f64) -> String {
     let sense = if sense * k > 0.0 { "with the reference" } else { "reversed: against the reference" };
     let pairs = if k.abs() == 1.0 { "1 period a turn".to_owned() } else { format!("{} pole pairs", k.abs()) };

@@ -83,11 +83,11 @@ pub(crate) struct Described<'a> {
 }
 
 impl Described<'_> {
-    /// k, with its sign as the recording has it.
+    /// k, in the sign that the campaign states.
     pub(crate) fn angular_gain(&self, stated: Option<f64>) -> Estimate {
         let (gain, deviation) = self.signed_gain();
-        // where something is stated, with the reference is positive; where nothing is, Equation 1 counts against it
-        let value = if stated.is_some() { gain } else { -gain };
+        let sign = if stated.map_or(-gain, |s| s).is_sign_negative() { -1.0 } else { 1.0 };
+        let value = sign * gain.abs();
         Estimate { value, ci95: [value - STUDENT_19 * deviation, value + STUDENT_19 * deviation] }
     }
 
