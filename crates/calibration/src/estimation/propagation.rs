@@ -316,6 +316,16 @@ mod tests {
 
     /// A pattern that turns at 5 rad/s with an amplitude and a quadrature that follow it; no commands.
     fn track() -> Track {
+        track_with([None, None])
+    }
+
+    /// The same with commands of 50 mV, and of 200 mV at 2θ.
+    fn commanded_track() -> Track {
+        let t_s = (0..400).map(|i| 0.01 * f64::from(i));
+        track_with([Some(vec![-0.05; 400]), Some(t_s.map(|t| 0.2 * (-10.0 * t).sin()).collect())])
+    }
+
+    fn track_with([vas_v, vqc_v]: [Option<Vec<f64>>; 2]) -> Track {
         let t_s: Vec<f64> = (0..400).map(|i| 0.01 * f64::from(i)).collect();
         let of = |f: fn(f64, f64) -> f64| {
             Some(t_s.iter().map(|t| f(-5.0 * t, 1.0 + 0.01 * (10.0 * t).sin())).collect::<Vec<_>>())
@@ -327,6 +337,8 @@ mod tests {
             ys_v: of(|theta, _| 2e-3 * theta.cos() * (2.0 * theta).cos() + 1e-3),
             rate_dps: Some(vec![(5.0_f64 / 0.8).to_degrees(); t_s.len()]),
             t_s,
+            vas_v,
+            vqc_v,
             ..Recording::default()
         };
         let run = Run {
@@ -357,10 +369,7 @@ mod tests {
         (hypothesis.damping_per_s, hypothesis.control_latency_s) = (0.06, 1e-3);
         let values = [
             (EffectId::DetectionGainMismatch, 0, 1.05),
-            // with the latency more unknowns of the drive than lanes
             (EffectId::ActuationGainMismatch, 0, 0.96),
-            (EffectId::ActuationSkew, 0, 0.002),
-            (EffectId::ActuationPhase, 0, 0.003),
             (EffectId::Anisodamping, 0, 0.01),
             (EffectId::Anisoelasticity, 1, 0.2),
         ];
@@ -373,13 +382,38 @@ mod tests {
             hypothesis.set(unknown, value);
             all.push(unknown);
         }
-        let unknowns = Unknowns::new(&hypothesis, all.clone());
-        let (_, slopes) = left_at_the_end(&track, &hypothesis, &unknowns);
+        assert_slopes_are_finite_differences(&track, &hypothesis, all);
+    }
+
+    /// More unknowns of the drive than an evaluation has lanes.
+    #[test]
+    fn every_unknown_of_the_drive_has_its_slope() {
+        let mut hypothesis = Hypothesis::ideal(crate::recording::Instrument::Gyroscope, std::f64::consts::PI, 0.8);
+        (hypothesis.force_scale, hypothesis.control_latency_s) = (1.1, 1e-3);
+        let values = [
+            (EffectId::ActuationGainMismatch, 0.96),
+            (EffectId::ActuationSkew, 0.02),
+            (EffectId::ActuationPhase, 0.03),
+        ];
+        let mut all = vec![Unknown::ForceScale, Unknown::ControlLatency];
+        for (id, value) in values {
+            let unknown = Unknown::Effect(hypothesis.admit(id, Origin::Declared), 0);
+            hypothesis.set(unknown, value);
+        }
+        all.extend(values.map(|(id, _)| Unknown::Effect(hypothesis.position(id).expect("a member"), 0)));
+        assert!(all.len() > crate::model::jet::LANES);
+        assert_slopes_are_finite_differences(&commanded_track(), &hypothesis, all);
+    }
+
+    #[track_caller]
+    fn assert_slopes_are_finite_differences(track: &Track, hypothesis: &Hypothesis, all: Vec<Unknown>) {
+        let unknowns = Unknowns::new(hypothesis, all.clone());
+        let (_, slopes) = left_at_the_end(track, hypothesis, &unknowns);
         for (unknown, slope) in all.into_iter().zip(slopes) {
             let moved = |by: f64| {
                 let mut h = hypothesis.clone();
                 h.set(unknown, h.get(unknown) + by);
-                left_at_the_end(&track, &h, &unknowns).0
+                left_at_the_end(track, &h, &unknowns).0
             };
             let by = 1e-5;
             // a slope is that of the prediction less the observation
