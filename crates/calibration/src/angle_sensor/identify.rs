@@ -265,7 +265,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
         instrument: Instrument::Gyroscope,
         stated_gain: Some(stated.unwrap_or(1.0)),
         reason: (!model.answered).then(|| {
-            "bias, scale factor and lag do not predict parts of the runs that were left out better than nothing".into()
+            "bias, scale factor and lag predict parts of the runs that were left out worse than nothing does".into()
         }),
         angular_gain: Estimate { value, ci95: [value - T_PARTS * deviation, value + T_PARTS * deviation] },
         detection_gain_ratio: None,

@@ -2,16 +2,17 @@
 //!
 //! $$e = b\\,t + s\\,α + l\\,Ω + \text{const}$$
 //!
-//! Their errors walk: a fit of the angle weighs the late part of a run by all that came before it. Increments over a
-//! second or more make a walk white, and Student's t gives bursts of motion little weight. Which estimator and which of
-//! the three terms predict parts of a run that were left out is found by cross-validation; the loss is the mean of
-//! ln variance, because the parts differ a hundredfold in how violently they move.
+//! by least squares of the angle, each run about its own mean. What such a gyroscope is wrong by besides comes of turns about
+//! its other axes, which end where they began as often as not: the error of the angle stays near a line, and a run is held
+//! best by all of its rows. Increments, which would make a random walk white, tell bias and scale factor worse here, and so
+//! does a choice among subsets of the terms by five parts that were left out: it is decided by the one part in which the
+//! others move most. The bias and the scale factor are therefore always estimated where they can be told apart. The lag is a
+//! matter of single turns, and blocks left out in turn say whether it helps.
 
 use super::samples::{Reading, SensorRun};
 use super::selection::VARYING_RATE;
 use super::sensor::{Sensor, centred};
 use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::robust_deviation;
 
 /// One of the three terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,34 +27,19 @@ pub(crate) enum Term {
     Lag,
 }
 
-/// How the terms are estimated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Estimator {
-    /// least squares on the angle
-    Angle,
-    /// Student-t regression of increments over so many seconds
-    Increments(f64),
-}
-
-const ESTIMATORS: [Estimator; 3] = [Estimator::Angle, Estimator::Increments(1.0), Estimator::Increments(4.0)];
-const SUBSETS: [&[Term]; 6] = [
-    &[Term::Bias],
-    &[Term::Scale],
-    &[Term::Lag],
-    &[Term::Scale, Term::Lag],
-    &[Term::Bias, Term::Lag],
-    &[Term::Bias, Term::Scale, Term::Lag],
-];
-/// Offered besides where the lag cannot be told without some part of the runs, as without the one turn back of a
-/// recording. Electronics have a lag: where it can be told, bias and scale factor are not tried without it.
-const WITHOUT_LAG: &[Term] = &[Term::Bias, Term::Scale];
+/// Blocks of the rows, and every so many of them left out together, that say whether a lag helps: the rms of what was left
+/// out falls by at least this share.
+const BLOCKS: usize = 60;
+const FOLDS: usize = 5;
+const LEAST_FALL: f64 = 0.01;
+/// Share of the reference's variance beside a line in time, below which a scale factor is not told from a bias.
+const TOLD_FROM_A_LINE: f64 = 1e-4;
 /// Parts of a run, each left out once.
 const PARTS: usize = 5;
+/// Standard errors by which left-out parts have to be predicted worse than by nothing for a fit to be refused.
+const HARMS: f64 = 2.0;
 /// Rows that a part needs to be fitted with.
 const FEWEST_ROWS: usize = 10;
-/// Degrees of freedom of Student's t (Lange, Little and Taylor 1989), and rounds of its reweighting at most.
-const DEGREES_OF_FREEDOM: f64 = 3.0;
-const REWEIGHTINGS: usize = 200;
 
 /// A stretch of a run: what is regressed on.
 #[derive(Debug, Clone)]
@@ -117,80 +103,69 @@ fn variance(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).max(1e-16)
 }
 
-/// Regression rows: regressors and value.
-type Rows = Vec<(Vec<f64>, f64)>;
+/// A row of the regression: regressors and error, each about its stretch's mean.
+type Row = (Vec<f64>, f64);
 
-fn rows(stretches: &[Stretch], terms: &[Term], estimator: Estimator) -> Rows {
-    let mut out = Rows::new();
+fn rows(stretches: &[Stretch], terms: &[Term]) -> Vec<Row> {
+    let mut out = Vec::new();
     for s in stretches {
         let n = s.error.len();
-        match estimator {
-            Estimator::Angle => {
-                let means: Vec<f64> =
-                    terms.iter().map(|t| (0..n).map(|i| s.regressor(*t, i)).sum::<f64>() / n as f64).collect();
-                let mean = s.error.iter().sum::<f64>() / n as f64;
-                out.extend((0..n).map(|i| {
-                    let row = terms.iter().zip(&means).map(|(t, m)| s.regressor(*t, i) - m).collect();
-                    (row, s.error[i] - mean)
-                }));
-            }
-            Estimator::Increments(seconds) => {
-                let mut steps: Vec<f64> = s.t.windows(2).map(|w| w[1] - w[0]).collect();
-                let interval = crate::estimation::statistics::median(&mut steps).max(1e-12);
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count")]
-                let width = ((seconds / interval).round() as usize).max(1);
-                out.extend((0..n.saturating_sub(width)).step_by((width / 2).max(1)).map(|i| {
-                    let row = terms.iter().map(|t| s.regressor(*t, i + width) - s.regressor(*t, i)).collect();
-                    (row, s.error[i + width] - s.error[i])
-                }));
-            }
-        }
+        let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
+        let means: Vec<f64> = terms.iter().map(|t| mean(&|i| s.regressor(*t, i))).collect();
+        let middle = mean(&|i| s.error[i]);
+        out.extend((0..n).map(|i| {
+            let row = terms.iter().zip(&means).map(|(t, m)| s.regressor(*t, i) - m).collect();
+            (row, s.error[i] - middle)
+        }));
     }
     out
 }
 
-fn estimate(stretches: &[Stretch], terms: &[Term], estimator: Estimator) -> Vec<f64> {
-    let rows = rows(stretches, terms, estimator);
-    let solve = |weights: Option<&[f64]>| {
-        let mut equations = NormalEquations::new(terms.len());
-        for (i, (row, value)) in rows.iter().enumerate() {
-            let root = weights.map_or(1.0, |w| w[i].sqrt());
-            let weighted: Vec<f64> = row.iter().map(|v| v * root).collect();
-            equations.add(&weighted, value * root);
-        }
-        equations.solve()
-    };
-    let mut values = solve(None);
-    if estimator == Estimator::Angle || rows.len() < 4 * terms.len() {
-        return values;
-    }
-    let left = |values: &[f64]| -> Vec<f64> {
-        rows.iter().map(|(row, y)| y - row.iter().zip(values).map(|(a, b)| a * b).sum::<f64>()).collect()
-    };
-    let mut scale = robust_deviation(left(&values).into_iter()) + 1e-15;
-    for _ in 0..REWEIGHTINGS {
-        let residuals = left(&values);
-        let weights: Vec<f64> =
-            residuals.iter().map(|q| (DEGREES_OF_FREEDOM + 1.0) / (DEGREES_OF_FREEDOM + (q / scale).powi(2))).collect();
-        let next = solve(Some(&weights));
-        let square: f64 = weights.iter().zip(&residuals).map(|(w, q)| w * q * q).sum::<f64>() / residuals.len() as f64;
-        let next_scale = square.sqrt() + 1e-15;
-        let largest = values.iter().fold(1e-9, |m: f64, v| m.max(v.abs()));
-        let moved = next.iter().zip(&values).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
-        let settled = moved < 1e-8 * largest && (next_scale / scale - 1.0).abs() < 1e-5;
-        (values, scale) = (next, next_scale);
-        if settled {
-            break;
+fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -> Vec<f64> {
+    let mut equations = NormalEquations::new(unknowns);
+    rows.for_each(|(row, value)| equations.add(row, *value));
+    equations.solve()
+}
+
+fn estimate(stretches: &[Stretch], terms: &[Term]) -> Vec<f64> {
+    solved(rows(stretches, terms).iter(), terms.len())
+}
+
+/// Mean square of blocks that were left out in turn, every fifth together, rad².
+fn left_out_in_turn(stretches: &[Stretch], terms: &[Term]) -> f64 {
+    let rows = rows(stretches, terms);
+    let length = (rows.len() / BLOCKS).max(1);
+    let fold = |i: usize| i / length % FOLDS;
+    let mut square = 0.0;
+    for out in 0..FOLDS {
+        let others = rows.iter().enumerate().filter(|(i, _)| fold(*i) != out).map(|(_, r)| r);
+        let values = solved(others, terms.len());
+        for (row, error) in rows.iter().enumerate().filter(|(i, _)| fold(*i) == out).map(|(_, r)| r) {
+            square += (error - row.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>()).powi(2);
         }
     }
-    values
+    square / rows.len().max(1) as f64
+}
+
+/// The terms that these stretches tell.
+fn told(stretches: &[Stretch]) -> Vec<Term> {
+    let line = rows(stretches, &[Term::Bias, Term::Scale]);
+    let moment = |i: usize, j: usize| line.iter().map(|(r, _)| r[i] * r[j]).sum::<f64>();
+    let beside_a_line = moment(1, 1) - moment(0, 1).powi(2) / moment(0, 0).max(f64::MIN_POSITIVE);
+    let mut terms = vec![Term::Bias];
+    if beside_a_line > TOLD_FROM_A_LINE * moment(1, 1) {
+        terms.push(Term::Scale);
+    }
+    let with_lag = [terms.as_slice(), &[Term::Lag]].concat();
+    let largest = (1.0 - LEAST_FALL).powi(2) * left_out_in_turn(stretches, &terms);
+    if left_out_in_turn(stretches, &with_lag) < largest { with_lag } else { terms }
 }
 
 /// An identified rate gyroscope.
 #[derive(Debug, Clone)]
 pub(crate) struct RateGyroscope {
     pub(crate) sensor: Sensor,
-    /// undoing the terms predicts parts of the runs that were left out
+    /// undoing the terms does not predict parts of the runs that were left out clearly worse than nothing does
     pub(crate) answered: bool,
     /// terms with their values and standard deviations by the jackknife over parts
     pub(crate) terms: Vec<(Term, f64, f64)>,
@@ -233,31 +208,21 @@ impl RateGyroscope {
         if splits.len() < 2 {
             return None;
         }
-        let losses = |terms: &[Term], fits: &[Vec<f64>]| -> Vec<f64> {
-            splits.iter().zip(fits).map(|(s, v)| variance(&s.test.left(terms, v)).ln()).collect()
-        };
+        let terms = told(&all);
+        let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &terms)).collect();
+        let log_variance = |left: Vec<f64>| variance(&left).ln();
+        let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(s.test.left(&terms, v))).collect();
+        let raw: Vec<f64> = splits.iter().map(|s| log_variance(s.test.error.clone())).collect();
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-        let raw = losses(&[], &vec![Vec::new(); splits.len()]);
-        let fastest = fastest(&all);
-        let tells_lag = |s: &Stretch| s.varies(fastest);
-        let without_lag = splits.iter().any(|s| !s.train.iter().any(tells_lag)).then_some(&WITHOUT_LAG);
-        let candidates = SUBSETS.iter().chain(without_lag).flat_map(|t| ESTIMATORS.iter().map(move |e| (*t, *e))).map(
-            |(terms, estimator)| {
-                let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, terms, estimator)).collect();
-                let loss = losses(terms, &fits);
-                (terms, estimator, fits, loss)
-            },
-        );
-        let (terms, estimator, fits, loss) = candidates.min_by(|a, b| mean(&a.3).total_cmp(&mean(&b.3)))?;
         let gained: Vec<f64> = loss.iter().zip(&raw).map(|(a, b)| a - b).collect();
         let n = gained.len() as f64;
         let scatter = gained.iter().map(|g| (g - mean(&gained)).powi(2)).sum::<f64>() / (n - 1.0);
-        let answered = mean(&gained) < -(scatter / n).sqrt();
-        let mut values = estimate(&all, terms, estimator);
-        let bias_varies = forget_a_bias_that_varies(&all, terms, estimator, &mut values);
+        let answered = mean(&gained) < HARMS * (scatter / n).sqrt();
+        let mut values = estimate(&all, &terms);
+        let bias_varies = forget_a_bias_that_varies(&all, &terms, &mut values);
         let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
-        let every_fit: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &every, estimator)).collect();
+        let every_fit: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &every)).collect();
         let chosen = terms.iter().position(|t| *t == Term::Scale).filter(|_| answered);
         let scale = chosen.map_or(0.0, |i| values[i]);
         Some(Self {
@@ -292,7 +257,7 @@ fn fastest(all: &[Stretch]) -> f64 {
 /// A bias is carried over to another run only where it repeats between runs: where the others' mean predicts a run's
 /// worse than nothing does, it is zero, and the other terms are estimated with each run's own. Beside a scale factor that
 /// asks for a run whose rate varies: at one rate a bias of its own and a scale factor are the same.
-fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], estimator: Estimator, values: &mut [f64]) -> bool {
+fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], values: &mut [f64]) -> bool {
     let Some(at) = terms.iter().position(|t| *t == Term::Bias).filter(|_| all.len() > 1) else { return false };
     let fastest = fastest(all);
     if terms.contains(&Term::Scale) && !all.iter().any(|s| s.varies(fastest)) {
@@ -300,7 +265,7 @@ fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], estimator: Estimat
     }
     let biases = all.iter().map(|s| Term::BiasOf(s.run));
     let own: Vec<Term> = biases.chain(terms.iter().copied().filter(|t| *t != Term::Bias)).collect();
-    let found = estimate(all, &own, estimator);
+    let found = estimate(all, &own);
     let (each, others) = found.split_at(all.len());
     let sum: f64 = each.iter().sum();
     let mean_of_others = |b: f64| (sum - b) / (each.len() - 1) as f64;
