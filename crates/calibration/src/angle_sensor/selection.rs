@@ -96,11 +96,13 @@ impl<'a> Selection<'a> {
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
         let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(|t| choose(&pool, *t).cloned()).collect();
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
-        let with_lines = |c| {
-            let Candidate { model, losses, .. } = self.with_lines(c);
-            Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses }
+        let with_lines = |c: Candidate<Model>| {
+            let short = short_beside(&c, &pool).map(|short| self.with_lines(short));
+            let ends: Vec<_> = short.into_iter().chain([self.with_lines(c)]).collect();
+            let Candidate { model, losses, .. } = choose(&ends, Tolerance::Half)?.clone();
+            Some(Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses })
         };
-        chosen.into_iter().map(with_lines).collect()
+        chosen.into_iter().filter_map(with_lines).collect()
     }
 
     /// A model with the isolated lines that it leaves.
@@ -266,6 +268,18 @@ impl<'a> Selection<'a> {
         let distinct = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
         (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
     }
+}
+
+/// The short table beside which the lines are looked for as well, where a long one was chosen: on stations that are left out
+/// in a pattern the overtones of a long table stand in for a line, and elsewhere for nothing.
+fn short_beside(chosen: &Candidate<Model>, pool: &[Candidate<Model>]) -> Option<Candidate<Model>> {
+    let (front, shape) = &chosen.model;
+    let is_short = |c: &&Candidate<Model>| {
+        let (other, short) = &c.model;
+        other == front && short.motion == shape.motion && short.order <= ORDER_BESIDE_LINES
+    };
+    let short: Vec<_> = pool.iter().filter(is_short).cloned().collect();
+    (shape.order > ORDER_BESIDE_LINES).then(|| choose(&short, Tolerance::Half).cloned()).flatten()
 }
 
 /// The better of the fits from every start.
