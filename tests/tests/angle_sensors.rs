@@ -172,7 +172,7 @@ fn a_long_table_does_not_stand_in_for_a_line_where_every_third_station_is_left_o
     let mut at = |held: bool| {
         let stations: Vec<u32> = (0..200).filter(|i| (i % 3 == 2) == held).collect();
         let degrees: Vec<f64> = stations.iter().map(|i| f64::from(*i) * 1.8).collect();
-        let signs = |i: &u32| if i % 2 == 0 { 0.041 } else { -0.041 };
+        let signs = |i: &u32| if i.is_multiple_of(2) { 0.041 } else { -0.041 };
         let theta = stations.iter().zip(&degrees).map(|(i, d)| d + error(*d) + signs(i) + 0.012 * noise.sample());
         let recording = Recording {
             t_s: stations.iter().map(|i| f64::from(*i)).collect(),
