@@ -71,6 +71,47 @@ fn a_fault_of_eight_degrees_with_overtones_is_found_in_one_turn_each_way() {
     }
 }
 
+/// A resolver with an error of four a turn that goes there and back at one speed but for ramps of a tenth of a second;
+/// what follows its motion is of the rate in deg/s.
+fn back_at_one_speed(seed: u64, role: Role, follows: impl Fn(f64) -> f64) -> Run {
+    let (mut noise, mut angle, step) = (Noise::new(seed), 0.0, 0.01);
+    let rate = |t: f64| {
+        let (ramp, leg) = (0.1, 4.0);
+        let within = t % leg;
+        let speed = 120.0 * (within / ramp).min((leg - within) / ramp).clamp(0.0, 1.0);
+        if t < leg { speed } else { -speed }
+    };
+    let mut recording = Recording { table_deg: Some(vec![]), theta_deg: Some(vec![]), ..Recording::default() };
+    for i in 0..800 {
+        let t = step * f64::from(i);
+        let phi = angle - follows(rate(t));
+        recording.t_s.push(t);
+        recording.table_deg.as_mut().unwrap().push(angle);
+        let error = 1.2 * (4.0 * phi.to_radians() + 0.4).sin();
+        recording.theta_deg.as_mut().unwrap().push(phi + error + 0.03 * noise.sample());
+        angle += step * rate(t + 0.5 * step);
+    }
+    run("there-and-back.csv", role, recording)
+}
+
+#[test]
+fn a_lag_is_told_from_a_dead_band_by_ramps_of_a_tenth_of_a_second() {
+    let lag = |rate: f64| 0.004 * rate;
+    let dead_band = |rate: f64| if rate == 0.0 { 0.0 } else { 0.3_f64.copysign(rate) };
+    for seed in 0..6 {
+        let [fit, held] = [Role::Fit, Role::Holdout];
+        let late = identified(sensor(vec![back_at_one_speed(seed, fit, lag), back_at_one_speed(seed + 50, held, lag)]));
+        let latency = find(&late, "angle-latency").unwrap_or_else(|| panic!("seed {seed}: {:#?}", late.report.effects));
+        assert!((latency.parameters[0].value - 0.004).abs() < 2e-4, "seed {seed}: {latency:?}");
+        let runs = vec![back_at_one_speed(seed, fit, dead_band), back_at_one_speed(seed + 50, held, dead_band)];
+        let dead = identified(sensor(runs));
+        assert!(find(&dead, "angle-latency").is_none(), "seed {seed}: {:#?}", dead.report.effects);
+        for i in [late, dead] {
+            assert!(held_out(&i) < 1.3 * 0.03, "seed {seed}: {}° left of 0.03° noise", held_out(&i));
+        }
+    }
+}
+
 /// A resolver with a lag that turns one way through `turns`, at one speed but for ramps of half a second.
 fn one_way(seed: u64, role: Role, speed_dps: f64, turns: f64) -> Run {
     let (mut noise, ramp) = (Noise::new(seed), 0.5);

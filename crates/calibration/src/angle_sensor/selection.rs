@@ -11,7 +11,7 @@ use super::lines::strongest_and_its_aliases;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
-use super::samples::{Reading, SensorRun, span};
+use super::samples::{Reading, SensorRun};
 use super::sensor::Sensor;
 use super::table_fit::{Motion, Sample, Shape, TableFit};
 use crate::model::angle_table::Form;
@@ -162,9 +162,7 @@ impl<'a> Selection<'a> {
         if both {
             all.push(Motion::Direction);
         }
-        if !both || !speed_is_one(&rates, fastest) {
-            all.extend([Motion::Rate, Motion::RateAndAcceleration]);
-        }
+        all.extend([Motion::Rate, Motion::RateAndAcceleration]);
         let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));
         match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
@@ -298,13 +296,4 @@ pub(crate) fn fit_from(
 /// Where the fits of a readout begin.
 pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
     [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
-}
-
-/// The reference turns at one speed both ways: a lag and a dead band are then nearly the same, and the ramps between tell little.
-fn speed_is_one(rates: &[f64], fastest: f64) -> bool {
-    let mut speeds: Vec<f64> = rates.iter().map(|r| r.abs()).filter(|r| *r > 0.5 * fastest).collect();
-    speeds.sort_by(f64::total_cmp);
-    let edge = speeds.len() / 20;
-    let inner = &speeds[edge..speeds.len() - edge];
-    inner.len() * 10 > rates.len() * 8 && span(inner) < 0.05 * fastest
 }
