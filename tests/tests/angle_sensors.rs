@@ -253,6 +253,43 @@ fn twenty_seven_stations_carry_four_harmonics() {
     }
 }
 
+/// Two channels at evenly spaced stations, one turn: offsets, a gain ratio of 1.1, a skew, and `fourth` deg at four a turn.
+fn channels_at_stations(stations: usize, held: bool, fourth: f64, noise_deg: f64, seed: u64) -> Run {
+    let mut noise = Noise::new(seed);
+    let kept: Vec<usize> = (0..stations).filter(|i| (i % 3 == 2) == held).collect();
+    let degrees: Vec<f64> = kept.iter().map(|i| *i as f64 * 360.0 / stations as f64).collect();
+    let mut channel = |shift: f64, gain: f64, skew: f64, offset: f64| -> Vec<f64> {
+        let at = |d: &f64| {
+            let phi = (d + fourth * (4.0 * d + 20.0).to_radians().sin() + shift).to_radians();
+            gain * (phi.cos() + skew * phi.sin()) + offset + noise_deg.to_radians() * noise.sample()
+        };
+        degrees.iter().map(at).collect()
+    };
+    let (x, y) = (channel(0.0, 1.1, 0.03, 0.2), channel(-90.0, 1.0, 0.0, -0.1));
+    let recording = Recording {
+        t_s: kept.iter().map(|i| *i as f64).collect(),
+        xc_v: Some(x),
+        yc_v: Some(y),
+        table_deg: Some(degrees),
+        ..Recording::default()
+    };
+    run("stations.csv", if held { Role::Holdout } else { Role::Fit }, recording)
+}
+
+#[test]
+fn eight_stations_tell_an_ellipse_and_forty_eight_four_harmonics_beside_it() {
+    for seed in 0..6 {
+        let few = [false, true].map(|held| channels_at_stations(12, held, 0.0, 0.2, seed + 30 * u64::from(held)));
+        let i = identified(sensor(few.into()));
+        assert!(find(&i, "detection-gain-mismatch").is_some(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 3.0 * 0.2, "seed {seed}: {}° left of 0.2° noise", held_out(&i));
+        let more = [false, true].map(|held| channels_at_stations(48, held, 0.3, 0.04, seed + 30 * u64::from(held)));
+        let i = identified(sensor(more.into()));
+        assert!(find(&i, "detection-gain-mismatch").is_some(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 2.0 * 0.04, "seed {seed}: {}° left of 0.04° noise", held_out(&i));
+    }
+}
+
 /// A resolver of eight pole pairs, off centre by 0.5° of its shaft, over so many turns; its angle is that of the poles.
 fn eccentric_poles(seed: u64, role: Role, turns: f64, eccentricity: f64, memory: f64) -> Run {
     let (mut noise, mut last, rows) = (Noise::new(seed), 0.0, 3000);

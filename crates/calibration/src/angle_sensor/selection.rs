@@ -23,12 +23,14 @@ const COARSE_ORDERS: [usize; 2] = [0, 4];
 const MOTION_ORDERS: [usize; 2] = [4, 12];
 /// Lengths offered anew beside an isolated line go up to this.
 const ORDER_BESIDE_LINES: usize = 12;
-/// Observations that a table needs for each of its unknowns, an engineering choice: 27 stations allow four harmonics.
+/// Observations that a table needs for each of its unknowns, an engineering choice: 27 stations allow four harmonics. A row
+/// observes the angle, and of two channels the radius too.
 const OBSERVATIONS_PER_UNKNOWN: usize = 3;
-/// And where a readout is fitted, whose unknowns partly do a table's work. A row observes the angle, and of two channels the
-/// radius too. A readout alone explains both, so that 17 stations allow offset, gain and skew; beside a table, which lives
-/// in the angle, it has the angle to share: 34 rows allow those and two harmonics.
+/// Observations for each unknown of a readout and a table together, two a row: 28 stations allow offset, gain and skew beside
+/// four harmonics, for the table lives in the angle and the readout in both.
 const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
+/// And of a readout alone, whose form is known: eight stations allow offset, gain and skew.
+const OBSERVATIONS_OF_A_READOUT: usize = 2;
 /// Rows beyond which selection looks at every so many only.
 const ENOUGH_ROWS: usize = 1500;
 /// Kinds of readout that are offered every length of the table.
@@ -98,11 +100,12 @@ impl<'a> Selection<'a> {
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
         let with_lines = |c: Candidate<Model>| {
             let short = short_beside(&c, &pool).map(|short| self.with_lines(short));
-            let ends: Vec<_> = short.into_iter().chain([self.with_lines(c)]).collect();
-            let Candidate { model, losses, .. } = choose(&ends, Tolerance::Half)?.clone();
-            Some(Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses })
+            let long = self.with_lines(c);
+            let Candidate { model, losses, .. } =
+                short.filter(|short| short.losses.rms() <= long.losses.rms()).unwrap_or(long);
+            Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses }
         };
-        chosen.into_iter().filter_map(with_lines).collect()
+        chosen.into_iter().map(with_lines).collect()
     }
 
     /// A model with the isolated lines that it leaves.
@@ -209,10 +212,16 @@ impl<'a> Selection<'a> {
     /// Whether so many rows observe enough for a readout and a shape.
     fn carries(&self, rows: usize, front: Option<Front>, shape: &Shape) -> bool {
         let of_readout = front.map_or(0, |f| f.0.free().len());
-        let alone = of_readout > 0 && *shape == Shape::constant(self.sensor.free_gain);
-        let observations = if alone { 2 * rows } else { rows };
-        let each = if of_readout > 0 { OBSERVATIONS_BESIDE_A_READOUT } else { OBSERVATIONS_PER_UNKNOWN };
-        (of_readout + shape.size() + self.runs.len()) * each <= observations
+        let of_table = shape.size() + self.runs.len();
+        let of_table_alone = of_table * OBSERVATIONS_PER_UNKNOWN <= rows;
+        if of_readout == 0 {
+            return of_table_alone;
+        }
+        let each = |observations: usize| (of_readout + of_table) * observations <= 2 * rows;
+        if *shape == Shape::constant(self.sensor.free_gain) {
+            return each(OBSERVATIONS_OF_A_READOUT);
+        }
+        of_table_alone && each(OBSERVATIONS_BESIDE_A_READOUT)
     }
 
     fn fit_without_each_fold(&self, front: Option<Front>) -> Option<WithoutFolds> {
