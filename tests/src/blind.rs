@@ -26,8 +26,13 @@ const DRAWN: [EffectId; 10] = [
     EffectId::TimePeriodic,
 ];
 /// What the electronics add that a split, a thermometer or another amplitude tells: drawn first on [`ELECTRONICS`].
-const OF_ELECTRONICS: [EffectId; 4] =
-    [EffectId::DetectionPhase, EffectId::DriveFeedthrough, EffectId::Temperature, EffectId::DetectionQuintic];
+const OF_ELECTRONICS: [EffectId; 5] = [
+    EffectId::DetectionPhase,
+    EffectId::DriveFeedthrough,
+    EffectId::Temperature,
+    EffectId::DetectionQuintic,
+    EffectId::ActuationPhase,
+];
 /// How many effects a campaign gets: none in one of six, two in two of six.
 const COUNTS: [usize; 6] = [0, 1, 1, 1, 2, 2];
 /// rms of the drawn signature over the noise floor of the held-out angle.

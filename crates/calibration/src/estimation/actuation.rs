@@ -41,6 +41,8 @@ const STEADY_SHARE: f64 = 0.6;
 const FEWEST: usize = 20;
 /// Commands per amplitude that differ by less than this share are the same, and one below this share of another is none.
 const SAME_COMMAND: f64 = 0.1;
+/// Rounds in which a decay's rate and the work of the quadrature command settle: each leaves a few hundredths of the last.
+const WORK_ROUNDS: usize = 4;
 /// Points of the decay that are kept for the report.
 const KEPT_POINTS: usize = 400;
 
@@ -76,7 +78,9 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             .unread(seen, &Moment { t_s: r.t_s[i], warmer_k, drive: commanded(&seen, &commands), ..Moment::default() })
     };
     let mut off_angle = Vec::new();
-    let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new()));
+    let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new(), Vec::new()));
+    // ∫ v_qc q/a² dt since the energy loop is off
+    let mut by_quadrature = 0.0;
     let first = r.t_s[settled.start];
     let steady = energy_off_s - STEADY_SHARE * (energy_off_s - first);
     let mut decay = Vec::new();
@@ -97,8 +101,11 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             on.1.push(ln_a);
             on.2.push(v_as[i] / ln_a.exp());
         } else if r.t_s[i] > energy_off_s {
+            let v_qc = r.vqc_v.as_ref().map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
+            by_quadrature += (r.t_s[i] - r.t_s[i - 1]) * 0.5 * v_qc * p.q / p.e.powf(1.5);
             off.0.push(r.t_s[i]);
             off.1.push(ln_a);
+            off.2.push(by_quadrature);
         }
     }
     let mut sorted = off_angle.clone();
@@ -126,31 +133,39 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             "vas_v = the energy control output, which vanishes at energy_off_s, and vqc_v = quadrature's",
         );
     }
-    let (rate, rate_error) = loop {
-        let (rate, error, intercept) = decay_rate(&off.0, &off.1);
+    loop {
+        let (rate, _, intercept) = decay_rate(&off.0, &off.1);
         let keep = without_spikes(&off.0, &off.1, |t| intercept - rate * t);
         let before = off.0.len();
-        retain(&mut off.0, &keep);
-        retain(&mut off.1, &keep);
-        if off.0.len() == before || off.0.len() < FEWEST {
-            break (rate, error);
+        for column in [&mut off.0, &mut off.1, &mut off.2] {
+            retain(column, &keep);
         }
-    };
+        if off.0.len() == before || off.0.len() < FEWEST {
+            break;
+        }
+    }
     let level = crate::estimation::statistics::median(&mut on.1.clone());
     let keep = without_spikes(&on.0, &on.1, |_| level);
     for column in [&mut on.0, &mut on.1, &mut on.2] {
         retain(column, &keep);
     }
-    if rate <= 3.0 * rate_error {
+    // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
+    let (trend, _) = line(&on.0, &on.1);
+    let n = on.2.len() as f64;
+    let mean = on.2.iter().sum::<f64>() / n;
+    // Off: ȧ/a = −1/τ + G v_qc q/a², for what holds the split works on the ellipse that its loop leaves while the amplitude falls
+    let (mut rate, mut rate_error, _) = decay_rate(&off.0, &off.1);
+    for _ in 0..WORK_ROUNDS {
+        let gain = -(rate + trend) / mean;
+        let undriven: Vec<f64> = off.1.iter().zip(&off.2).map(|(ln_a, work)| ln_a - gain * work).collect();
+        (rate, rate_error, _) = decay_rate(&off.0, &undriven);
+    }
+    if !(rate > 3.0 * rate_error) {
         return refuse(
             format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
             "a ring-down with the energy loop off",
         );
     }
-    // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
-    let (trend, _) = line(&on.0, &on.1);
-    let n = on.2.len() as f64;
-    let mean = on.2.iter().sum::<f64>() / n;
     let drive = mean * rate / (rate + trend);
     Ok(RingDown {
         name,

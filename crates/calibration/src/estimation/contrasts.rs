@@ -16,7 +16,7 @@ const VARYING_RATE: f64 = 0.2;
 const STRETCHES: usize = 50;
 const EDGE: usize = 30;
 /// Temperatures that differ by less than this are one, K.
-const SAME_TEMPERATURE_K: f64 = 1.0;
+const SAME_TEMPERATURE_K: f64 = 0.25;
 
 /// Rates of the table over short stretches of one segment after the other, rad/s; stops left out.
 fn stretches<'a>(of: impl Iterator<Item = (&'a Track, Vec<Segment>)>) -> Vec<Vec<f64>> {
