@@ -160,7 +160,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         let undriven: Vec<f64> = off.1.iter().zip(&off.2).map(|(ln_a, work)| ln_a - gain * work).collect();
         (rate, rate_error, _) = decay_rate(&off.0, &undriven);
     }
-    if !(rate > 3.0 * rate_error) {
+    if rate.is_nan() || rate <= 3.0 * rate_error {
         return refuse(
             format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
             "a ring-down with the energy loop off",
