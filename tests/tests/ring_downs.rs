@@ -71,6 +71,21 @@ fn what_holds_a_large_split_is_not_taken_for_damping() {
     assert!((found.parameters[0].value / 0.012 - 1.0).abs() < 0.01, "{found:?}");
 }
 
+/// A recording that begins after the energy loop was switched off holds a decay and no command.
+#[test]
+fn a_ring_down_without_its_beginning_is_refused() {
+    let mut campaign = recorded(settings());
+    let run = &mut ring_downs(&mut campaign)[0];
+    let RunKind::Ringdown { energy_off_s, .. } = run.kind else { unreachable!() };
+    let r = &mut run.recording;
+    let first = r.t_s.iter().position(|t| *t > energy_off_s).unwrap();
+    r.t_s.drain(..first);
+    let columns = [&mut r.xc_v, &mut r.xs_v, &mut r.yc_v, &mut r.ys_v, &mut r.vas_v, &mut r.vqc_v, &mut r.rate_dps];
+    columns.into_iter().flatten().for_each(|column| drop(column.drain(..first)));
+    let refused = identified(campaign).unwrap_err().to_string();
+    assert!(refused.contains("ringdown-0.csv: 0 steady samples with the energy loop on"), "{refused}");
+}
+
 /// A logger that keeps the last value, or a controller that goes on behind a switch that is open.
 #[test]
 fn an_energy_command_that_is_recorded_but_does_not_act_is_no_fault() {

@@ -46,6 +46,108 @@ const WORK_ROUNDS: usize = 4;
 /// Points of the decay that are kept for the report.
 const KEPT_POINTS: usize = 400;
 
+/// Samples of one phase of a ring-down.
+#[derive(Debug, Clone, Default)]
+struct Phase {
+    t_s: Vec<f64>,
+    /// ln of the amplitude
+    ln_a: Vec<f64>,
+    /// on: v_as/a; off: ∫ v_qc q/a² dt since the energy loop is off, V s/V
+    command: Vec<f64>,
+}
+
+impl Phase {
+    fn push(&mut self, t_s: f64, ln_a: f64, command: f64) {
+        self.t_s.push(t_s);
+        self.ln_a.push(ln_a);
+        self.command.push(command);
+    }
+
+    fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Drops the samples that are no amplitude near what is expected, and says whether there were any.
+    fn drop_spikes(&mut self, expected: impl Fn(f64) -> f64) -> bool {
+        let keep = without_spikes(&self.t_s, &self.ln_a, expected);
+        for column in [&mut self.t_s, &mut self.ln_a, &mut self.command] {
+            retain(column, &keep);
+        }
+        keep.contains(&false)
+    }
+}
+
+/// A ring-down with the readout undone.
+struct Phases {
+    on: Phase,
+    off: Phase,
+    /// of the pattern from the campaign's angle, rad
+    off_angle: Vec<f64>,
+    decay: Vec<(f64, f64)>,
+}
+
+/// Undoes the readout effects of `hypothesis` and parts the samples into those of the steady end of the energy loop's
+/// phase and those after it.
+fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64) -> Result<Phases, Refusal> {
+    let r = &run.recording;
+    let (Some(x), Some(y), Some(v_as)) = (&r.xc_v, &r.yc_v, &r.vas_v) else {
+        let name = crate::data::track::run_name(run);
+        return Err(Refusal::new(&name, "columns xc_v, yc_v and vas_v are needed", "all three"));
+    };
+    let settled = run.settled()?;
+    let quadrature = r.xs_v.as_ref().zip(r.ys_v.as_ref());
+    let warmer_k = |i: usize| {
+        let difference = r.temp_c.as_ref().zip(hypothesis.reference_c).map(|(t, reference)| t[i] - reference);
+        difference.filter(|d| d.is_finite()).unwrap_or_default()
+    };
+    // commands that are missing in a row move nothing there
+    let command = |v: Option<&Vec<f64>>, i: usize| v.map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
+    let steady = energy_off_s - STEADY_SHARE * (energy_off_s - r.t_s[settled.start]);
+    let stride = (settled.len() / KEPT_POINTS).max(1);
+    let mut found = Phases { on: Phase::default(), off: Phase::default(), off_angle: Vec::new(), decay: Vec::new() };
+    let (mut before, mut work) = (None, 0.0);
+    for i in settled.clone() {
+        let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
+        let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
+        let commands = ControlOutputs { v_as: command(Some(v_as), i), v_qc: command(r.vqc_v.as_ref(), i) };
+        let drive = commanded(&seen, &commands);
+        let now = Moment { t_s: r.t_s[i], warmer_k: warmer_k(i), drive, ..Moment::default() };
+        let p = hypothesis.unread(seen, &now).pendulum();
+        found.off_angle.push(wrapped(p.angle() - angle_rad, std::f64::consts::PI));
+        let ln_a = 0.5 * p.e.ln();
+        if !ln_a.is_finite() {
+            continue;
+        }
+        if (i - settled.start).is_multiple_of(stride) {
+            found.decay.push((r.t_s[i], ln_a.exp()));
+        }
+        if r.t_s[i] >= steady && r.t_s[i] < energy_off_s && v_as[i].is_finite() {
+            found.on.push(r.t_s[i], ln_a, v_as[i] / ln_a.exp());
+        } else if r.t_s[i] > energy_off_s {
+            let step = before.map_or(0.0, |before| r.t_s[i] - before);
+            work += step * 0.5 * commands.v_qc * p.q / p.e.powf(1.5);
+            found.off.push(r.t_s[i], ln_a, work);
+        }
+        before = Some(r.t_s[i]);
+    }
+    Ok(found)
+}
+
+/// The damping that a decay shows, 1/s, and its standard error: ȧ/a = −1/τ + G v_qc q/a², for what holds a split works on
+/// the ellipse that the quadrature loop leaves while the amplitude falls. `hold` is the v_as/a that balances this
+/// damping, so that G = −1/(τ·hold).
+fn damping(off: &Phase, hold: impl Fn(f64) -> f64) -> (f64, f64) {
+    let (mut rate, mut error, _) = decay_rate(&off.t_s, &off.ln_a);
+    for _ in 0..WORK_ROUNDS {
+        let gain = -rate / hold(rate);
+        // a loop that was never on tells no gain, and does no work that is known
+        let gain = if gain.is_finite() { gain } else { 0.0 };
+        let undriven: Vec<f64> = off.ln_a.iter().zip(&off.command).map(|(ln_a, work)| ln_a - gain * work).collect();
+        (rate, error, _) = decay_rate(&off.t_s, &undriven);
+    }
+    (rate, error)
+}
+
 /// Evaluates a ring-down after undoing the readout effects of `hypothesis`.
 ///
 /// # Errors
@@ -56,60 +158,9 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         return Err(Refusal::new(&name, "is not a ring-down", "kind = \"ringdown\""));
     };
     let refuse = |problem: String, wanted: &str| Err(Refusal::new(&name, problem, wanted));
-    let settled = run.settled()?;
-    let r = &run.recording;
-    let (Some(x), Some(y), Some(v_as)) = (&r.xc_v, &r.yc_v, &r.vas_v) else {
-        return refuse("columns xc_v, yc_v and vas_v are needed".into(), "all three");
-    };
-    let quadrature = r.xs_v.as_ref().zip(r.ys_v.as_ref());
     let angle_rad = angle_deg.to_radians();
-    let warmer_k = |i: usize| {
-        let difference = r.temp_c.as_ref().zip(hypothesis.reference_c).map(|(t, reference)| t[i] - reference);
-        difference.filter(|d| d.is_finite()).unwrap_or_default()
-    };
-    let sample = |i: usize| {
-        let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
-        let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
-        // commands that are missing in a row move nothing there
-        let command = |v: Option<&Vec<f64>>| v.map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
-        let commands = ControlOutputs { v_as: command(Some(v_as)), v_qc: command(r.vqc_v.as_ref()) };
-        let warmer_k = warmer_k(i);
-        hypothesis
-            .unread(seen, &Moment { t_s: r.t_s[i], warmer_k, drive: commanded(&seen, &commands), ..Moment::default() })
-    };
-    let mut off_angle = Vec::new();
-    let (mut on, mut off) = ((Vec::new(), Vec::new(), Vec::new()), (Vec::new(), Vec::new(), Vec::new()));
-    // ∫ v_qc q/a² dt since the energy loop is off
-    let mut by_quadrature = 0.0;
-    let first = r.t_s[settled.start];
-    let steady = energy_off_s - STEADY_SHARE * (energy_off_s - first);
-    let mut decay = Vec::new();
-    let stride = (settled.len() / KEPT_POINTS).max(1);
-    for i in settled.clone() {
-        let z = sample(i);
-        let p = z.pendulum();
-        off_angle.push(wrapped(p.angle() - angle_rad, std::f64::consts::PI));
-        let ln_a = 0.5 * p.e.ln();
-        if !ln_a.is_finite() {
-            continue;
-        }
-        if (i - settled.start).is_multiple_of(stride) {
-            decay.push((r.t_s[i], ln_a.exp()));
-        }
-        if r.t_s[i] >= steady && r.t_s[i] < energy_off_s && v_as[i].is_finite() {
-            on.0.push(r.t_s[i]);
-            on.1.push(ln_a);
-            on.2.push(v_as[i] / ln_a.exp());
-        } else if r.t_s[i] > energy_off_s {
-            let v_qc = r.vqc_v.as_ref().map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
-            by_quadrature += (r.t_s[i] - r.t_s[i - 1]) * 0.5 * v_qc * p.q / p.e.powf(1.5);
-            off.0.push(r.t_s[i]);
-            off.1.push(ln_a);
-            off.2.push(by_quadrature);
-        }
-    }
-    let mut sorted = off_angle.clone();
-    let middle = crate::estimation::statistics::median(&mut sorted);
+    let Phases { mut on, mut off, off_angle, decay } = phases(run, hypothesis, angle_rad, energy_off_s)?;
+    let middle = crate::estimation::statistics::median(&mut off_angle.clone());
     let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
     if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
         return refuse(
@@ -121,59 +172,44 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             "a recording with the pattern held at angle_deg",
         );
     }
-    if on.0.len() < FEWEST || off.0.len() < FEWEST {
+    if on.len() < FEWEST || off.len() < FEWEST {
         return refuse(
-            format!("{} steady samples with the energy loop on and {} with it off", on.0.len(), off.0.len()),
+            format!("{} steady samples with the energy loop on and {} with it off", on.len(), off.len()),
             "at least 20 of each around energy_off_s",
         );
     }
-    if let Some(why) = command_that_goes_on(run, settled, energy_off_s) {
+    if let Some(why) = command_that_goes_on(run, run.settled()?, energy_off_s) {
         return refuse(
             why,
             "vas_v = the energy control output, which vanishes at energy_off_s, and vqc_v = quadrature's",
         );
     }
     loop {
-        let (rate, _, intercept) = decay_rate(&off.0, &off.1);
-        let keep = without_spikes(&off.0, &off.1, |t| intercept - rate * t);
-        let before = off.0.len();
-        for column in [&mut off.0, &mut off.1, &mut off.2] {
-            retain(column, &keep);
-        }
-        if off.0.len() == before || off.0.len() < FEWEST {
+        let (rate, _, intercept) = decay_rate(&off.t_s, &off.ln_a);
+        if !off.drop_spikes(|t| intercept - rate * t) || off.len() < FEWEST {
             break;
         }
     }
-    let level = crate::estimation::statistics::median(&mut on.1.clone());
-    let keep = without_spikes(&on.0, &on.1, |_| level);
-    for column in [&mut on.0, &mut on.1, &mut on.2] {
-        retain(column, &keep);
-    }
+    let level = crate::estimation::statistics::median(&mut on.ln_a.clone());
+    on.drop_spikes(|_| level);
     // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
-    let (trend, _) = line(&on.0, &on.1);
-    let n = on.2.len() as f64;
-    let mean = on.2.iter().sum::<f64>() / n;
-    // Off: ȧ/a = −1/τ + G v_qc q/a², for what holds the split works on the ellipse that its loop leaves while the amplitude falls
-    let (mut rate, mut rate_error, _) = decay_rate(&off.0, &off.1);
-    for _ in 0..WORK_ROUNDS {
-        let gain = -(rate + trend) / mean;
-        let undriven: Vec<f64> = off.1.iter().zip(&off.2).map(|(ln_a, work)| ln_a - gain * work).collect();
-        (rate, rate_error, _) = decay_rate(&off.0, &undriven);
-    }
-    if rate.is_nan() || rate <= 3.0 * rate_error {
+    let (trend, _) = line(&on.t_s, &on.ln_a);
+    let mean = on.command.iter().sum::<f64>() / on.len() as f64;
+    let hold = |rate: f64| mean * rate / (rate + trend);
+    let (rate, rate_error) = damping(&off, hold);
+    if rate <= 3.0 * rate_error {
         return refuse(
             format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
             "a ring-down with the energy loop off",
         );
     }
-    let drive = mean * rate / (rate + trend);
     Ok(RingDown {
         name,
         angle_rad: angle_rad + middle,
         tau_s: 1.0 / rate,
         tau_error_s: rate_error / (rate * rate),
-        drive,
-        drive_error: STUDENT_11 * mean_error(&on.2, mean),
+        drive: hold(rate),
+        drive_error: STUDENT_11 * mean_error(&on.command, mean),
         decay,
     })
 }
