@@ -238,6 +238,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
     let (gain, deviation) = model.gain;
     let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
+    let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
     let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
     neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
     let mut hypothesis =
@@ -255,6 +256,13 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
     let thinned = thinned(runs);
     let samples = model.sensor.samples(&thinned, None);
     let mut warnings = Vec::new();
+    if deviation.is_none() {
+        warnings.push(
+            "the runs turn at one rate, at which a scale factor is not told from a bias: what is wrong stands as a bias, and \
+             the angular gain's interval says nothing; a run at another rate, or back, tells them apart"
+                .into(),
+        );
+    }
     if model.bias_varies {
         warnings
             .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
@@ -267,7 +275,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
         reason: (!model.answered).then(|| {
             "bias, scale factor and lag predict parts of the runs that were left out worse than nothing does".into()
         }),
-        angular_gain: Estimate { value, ci95: [value - T_PARTS * deviation, value + T_PARTS * deviation] },
+        angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
         detection_gain_ratio: None,
         effects: rate_effects(&model),
         hypothesis,

@@ -9,6 +9,7 @@
 //! others move most. The bias and the scale factor are therefore always estimated where they can be told apart. The lag is a
 //! matter of single turns, and blocks left out in turn say whether it helps.
 
+use super::cross_validation::Folds;
 use super::samples::{Reading, SensorRun};
 use super::selection::VARYING_RATE;
 use super::sensor::{Sensor, centred};
@@ -27,10 +28,7 @@ pub(crate) enum Term {
     Lag,
 }
 
-/// Blocks of the rows, and every so many of them left out together, that say whether a lag helps: the rms of what was left
-/// out falls by at least this share.
-const BLOCKS: usize = 60;
-const FOLDS: usize = 5;
+/// A lag is kept where the rms of blocks that were left out in turn falls by at least this share.
 const LEAST_FALL: f64 = 0.01;
 /// Share of the reference's variance beside a line in time, below which a scale factor is not told from a bias.
 const TOLD_FROM_A_LINE: f64 = 1e-4;
@@ -131,24 +129,19 @@ fn estimate(stretches: &[Stretch], terms: &[Term]) -> Vec<f64> {
     solved(rows(stretches, terms).iter(), terms.len())
 }
 
-/// Mean square of blocks that were left out in turn, every fifth together, rad².
-fn left_out_in_turn(stretches: &[Stretch], terms: &[Term]) -> f64 {
-    let rows = rows(stretches, terms);
-    let length = (rows.len() / BLOCKS).max(1);
-    let fold = |i: usize| i / length % FOLDS;
-    let mut square = 0.0;
-    for out in 0..FOLDS {
-        let others = rows.iter().enumerate().filter(|(i, _)| fold(*i) != out).map(|(_, r)| r);
-        let values = solved(others, terms.len());
-        for (row, error) in rows.iter().enumerate().filter(|(i, _)| fold(*i) == out).map(|(_, r)| r) {
-            square += (error - row.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>()).powi(2);
-        }
-    }
-    square / rows.len().max(1) as f64
+/// Sum of squares of interleaved blocks that were left out in turn, rad².
+fn left_out_in_turn(stretches: &[Stretch], folds: &Folds, terms: &[Term]) -> f64 {
+    let rows: Vec<(Row, usize)> = rows(stretches, terms).into_iter().zip(folds.fold.iter().copied()).collect();
+    let square_of = |out: usize| {
+        let values = solved(rows.iter().filter(|r| r.1 != out).map(|r| &r.0), terms.len());
+        let left = |(row, error): &Row| error - row.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>();
+        rows.iter().filter(|r| r.1 == out).map(|r| left(&r.0).powi(2)).sum::<f64>()
+    };
+    (0..folds.count).map(square_of).sum()
 }
 
-/// The terms that these stretches tell.
-fn told(stretches: &[Stretch]) -> Vec<Term> {
+/// The terms that these stretches tell, of which `folds` leaves out blocks.
+fn told(stretches: &[Stretch], folds: &Folds) -> Vec<Term> {
     let line = rows(stretches, &[Term::Bias, Term::Scale]);
     let moment = |i: usize, j: usize| line.iter().map(|(r, _)| r[i] * r[j]).sum::<f64>();
     let beside_a_line = moment(1, 1) - moment(0, 1).powi(2) / moment(0, 0).max(f64::MIN_POSITIVE);
@@ -157,8 +150,8 @@ fn told(stretches: &[Stretch]) -> Vec<Term> {
         terms.push(Term::Scale);
     }
     let with_lag = [terms.as_slice(), &[Term::Lag]].concat();
-    let largest = (1.0 - LEAST_FALL).powi(2) * left_out_in_turn(stretches, &terms);
-    if left_out_in_turn(stretches, &with_lag) < largest { with_lag } else { terms }
+    let left = |terms: &[Term]| left_out_in_turn(stretches, folds, terms).sqrt();
+    if left(&with_lag) < (1.0 - LEAST_FALL) * left(&terms) { with_lag } else { terms }
 }
 
 /// An identified rate gyroscope.
@@ -174,8 +167,8 @@ pub(crate) struct RateGyroscope {
     /// geometric mean of the left-out rms, rad, with the terms and without
     pub(crate) predicted: f64,
     pub(crate) predicted_raw: f64,
-    /// k and its standard deviation, from all terms together
-    pub(crate) gain: (f64, f64),
+    /// k and its standard deviation, from all terms together; `None` where a scale factor is not told from a bias
+    pub(crate) gain: (f64, Option<f64>),
 }
 
 /// A left-out part and what is fitted without it.
@@ -200,15 +193,16 @@ fn splits(all: &[Stretch]) -> Vec<Split> {
 }
 
 impl RateGyroscope {
-    /// Identifies bias, scale factor and lag; `None` where no run has an angle or rows enough.
+    /// Identifies bias, scale factor and lag; `None` where a run has no angle or all of them too few rows.
     pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Option<Self> {
         let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs).ok()?;
-        let all: Vec<Stretch> = runs.iter().enumerate().filter_map(|(i, r)| Stretch::new(r, i, &sensor)).collect();
+        let all: Vec<Stretch> =
+            runs.iter().enumerate().map(|(i, r)| Stretch::new(r, i, &sensor)).collect::<Option<_>>()?;
         let splits = splits(&all);
         if splits.len() < 2 {
             return None;
         }
-        let terms = told(&all);
+        let terms = told(&all, &Folds::interleaved(runs));
         let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &terms)).collect();
         let log_variance = |left: Vec<f64>| variance(&left).ln();
         let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(s.test.left(&terms, v))).collect();
@@ -223,8 +217,8 @@ impl RateGyroscope {
         let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
         let every_fit: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &every)).collect();
-        let chosen = terms.iter().position(|t| *t == Term::Scale).filter(|_| answered);
-        let scale = chosen.map_or(0.0, |i| values[i]);
+        let tells_scale = terms.iter().position(|t| *t == Term::Scale);
+        let scale = tells_scale.filter(|_| answered).map_or(0.0, |i| values[i]);
         Some(Self {
             sensor,
             answered,
@@ -232,7 +226,7 @@ impl RateGyroscope {
             bias_varies,
             predicted: (0.5 * mean(&loss)).exp(),
             predicted_raw: (0.5 * mean(&raw)).exp(),
-            gain: (sensor.gain + scale, jackknife(&every_fit, 3)[1]),
+            gain: (sensor.gain + scale, tells_scale.map(|_| jackknife(&every_fit, 3)[1])),
         })
     }
 
@@ -319,6 +313,23 @@ mod tests {
             reference_rad,
             t_s,
         }
+    }
+
+    #[test]
+    fn at_one_rate_a_scale_factor_is_not_told_from_a_bias() {
+        let SensorRun { mut reading, mut t_s, mut reference_rad, mut rate_rad_s, mut acceleration_rad_s2, .. } =
+            there_and_back();
+        let there = t_s.iter().filter(|t| **t < 10.0).count();
+        let Reading::Angle(angle) = &mut reading else { unreachable!() };
+        for column in [&mut t_s, &mut reference_rad, &mut rate_rad_s, &mut acceleration_rad_s2, angle] {
+            column.truncate(there);
+        }
+        let run = SensorRun { reading, t_s, reference_rad, rate_rad_s, acceleration_rad_s2, ..there_and_back() };
+        let found = RateGyroscope::identify(None, std::f64::consts::TAU, &[run]).expect("rows enough");
+        assert!(found.terms.len() == 1 && found.terms[0].0 == Term::Bias, "{found:?}");
+        // 0.006 of the bias and 2 % of 0.7 rad/s together
+        assert!((found.value(Term::Bias) - (0.006 - 0.014)).abs() < 1e-4, "{found:?}");
+        assert!(found.gain.1.is_none(), "{found:?}");
     }
 
     #[test]
