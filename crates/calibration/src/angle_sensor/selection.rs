@@ -23,14 +23,12 @@ const COARSE_ORDERS: [usize; 2] = [0, 4];
 const MOTION_ORDERS: [usize; 2] = [4, 12];
 /// Lengths offered anew beside an isolated line go up to this.
 const ORDER_BESIDE_LINES: usize = 12;
-/// Observations that a table needs for each of its unknowns, an engineering choice: 27 stations allow four harmonics. A row
-/// observes the angle, and of two channels the radius too.
+/// Observations for each unknown, an engineering choice. A row observes the angle, and of two channels the radius too: 27
+/// stations allow a table of four harmonics, and eight a readout's offset, gain and skew.
 const OBSERVATIONS_PER_UNKNOWN: usize = 3;
-/// Observations for each unknown of a readout and a table together, two a row: 28 stations allow offset, gain and skew beside
-/// four harmonics, for the table lives in the angle and the readout in both.
+/// And of a readout and a table together: the table lives in the angle, and the readout in both. 27 stations allow offset,
+/// gain and skew beside four harmonics.
 const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
-/// And of a readout alone, whose form is known: eight stations allow offset, gain and skew.
-const OBSERVATIONS_OF_A_READOUT: usize = 2;
 /// Rows beyond which selection looks at every so many only.
 const ENOUGH_ROWS: usize = 1500;
 /// Kinds of readout that are offered every length of the table.
@@ -191,13 +189,15 @@ impl<'a> Selection<'a> {
         let fitted: Vec<_> = missing.par_iter().map(|f| (*f, self.fit_without_each_fold(*f))).collect();
         self.without.extend(fitted);
         let rows: usize = self.runs.iter().map(SensorRun::len).sum();
+        let constant = Shape::constant(self.sensor.free_gain).size();
         let pairs: Vec<(Option<Front>, &Shape)> =
             fronts.iter().flat_map(|f| shapes.iter().map(move |s| (*f, s))).collect();
         pairs
             .into_par_iter()
             .filter_map(|(front, shape)| {
-                let size = front.map_or(0, |f| f.0.free().len()) + shape.size();
-                if !self.carries(rows, front, shape) {
+                let of_readout = front.map_or(0, |f| f.0.free().len());
+                let size = of_readout + shape.size();
+                if !carries(rows, of_readout, shape.size() - constant, self.runs.len() + constant) {
                     return None;
                 }
                 let WithoutFolds { samples, of_radius } = self.without.get(&front)?.as_ref()?;
@@ -207,21 +207,6 @@ impl<'a> Selection<'a> {
                 Some(Candidate { size, model: (front, shape.clone()), losses, of_radius: of_radius.clone() })
             })
             .collect()
-    }
-
-    /// Whether so many rows observe enough for a readout and a shape.
-    fn carries(&self, rows: usize, front: Option<Front>, shape: &Shape) -> bool {
-        let of_readout = front.map_or(0, |f| f.0.free().len());
-        let of_table = shape.size() + self.runs.len();
-        let of_table_alone = of_table * OBSERVATIONS_PER_UNKNOWN <= rows;
-        if of_readout == 0 {
-            return of_table_alone;
-        }
-        let each = |observations: usize| (of_readout + of_table) * observations <= 2 * rows;
-        if *shape == Shape::constant(self.sensor.free_gain) {
-            return each(OBSERVATIONS_OF_A_READOUT);
-        }
-        of_table_alone && each(OBSERVATIONS_BESIDE_A_READOUT)
     }
 
     fn fit_without_each_fold(&self, front: Option<Front>) -> Option<WithoutFolds> {
@@ -277,6 +262,17 @@ impl<'a> Selection<'a> {
     }
 }
 
+/// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.
+fn carries(rows: usize, of_readout: usize, of_table: usize, constants: usize) -> bool {
+    let in_angle = (of_table + constants) * OBSERVATIONS_PER_UNKNOWN <= rows;
+    let in_both = |each: usize| (of_readout + of_table + constants) * each <= 2 * rows;
+    match (of_readout, of_table) {
+        (0, _) => in_angle,
+        (_, 0) => in_both(OBSERVATIONS_PER_UNKNOWN),
+        _ => in_angle && in_both(OBSERVATIONS_BESIDE_A_READOUT),
+    }
+}
+
 /// The short table beside which the lines are looked for as well, where a long one was chosen: on stations that are left out
 /// in a pattern the overtones of a long table stand in for a line, and elsewhere for nothing.
 fn short_beside(chosen: &Candidate<Model>, pool: &[Candidate<Model>]) -> Option<Candidate<Model>> {
@@ -305,4 +301,16 @@ pub(crate) fn fit_from(
 /// Where the fits of a readout begin.
 pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
     [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_carry_as_many_unknowns_as_they_observe() {
+        let least = |of_readout, of_table| (0..).find(|rows| carries(*rows, of_readout, of_table, 1));
+        let affine = Kind::Affine.free().len();
+        assert_eq!([least(0, 8), least(affine, 0), least(affine, 8)], [Some(27), Some(8), Some(27)]);
+    }
 }
