@@ -64,6 +64,12 @@ pub fn find<'a>(i: &'a Identification, id: &str) -> Option<&'a EffectReport> {
     i.report.effects.iter().find(|e| e.id == id)
 }
 
+/// The lines of the reference's turn that were found, per turn.
+#[must_use]
+pub fn lines(i: &Identification) -> Vec<f64> {
+    i.report.effects.iter().filter(|e| e.id == "table-harmonic").map(|e| e.parameters[0].value).collect()
+}
+
 /// Two channels with offset, gain, skew and a cubic, in units of `unit` a volt.
 #[must_use]
 pub fn channels(angles_deg: &[f64], unit: f64, cubic: f64, noise_v: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {

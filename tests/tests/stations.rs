@@ -4,7 +4,7 @@
 use cvg_calibration::Identification;
 use cvg_calibration::recording::{Recording, Role, Run};
 use cvg_calibration::report::Status;
-use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, run, sensor};
+use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, lines, run, sensor};
 
 /// Two channels at angles, a reading a second.
 fn read_at(angles: Vec<f64>, x: Vec<f64>, y: Vec<f64>, role: Role) -> Run {
@@ -16,6 +16,21 @@ fn read_at(angles: Vec<f64>, x: Vec<f64>, y: Vec<f64>, role: Role) -> Run {
         ..Recording::default()
     };
     run("stations.csv", role, recording)
+}
+
+/// An angle at stations, a degree a second.
+fn angle_at(degrees: Vec<f64>, theta: impl FnMut(f64) -> f64, role: Role) -> Run {
+    let recording = Recording {
+        t_s: degrees.clone(),
+        theta_deg: Some(degrees.iter().copied().map(theta).collect()),
+        table_deg: Some(degrees),
+        ..Recording::default()
+    };
+    run("stations.csv", role, recording)
+}
+
+fn role(held: bool) -> Role {
+    if held { Role::Holdout } else { Role::Fit }
 }
 
 /// Twenty-four stations there and back.
@@ -75,16 +90,12 @@ fn seventeen_stations_are_enough_for_offset_gain_and_skew() {
 fn a_line_that_the_stations_see_at_one_phase_does_not_swing_between_them() {
     let at = |first: f64, role, seed| {
         let angles: Vec<f64> = (0..36).map(|i| f64::from(i).mul_add(10.0, first)).collect();
-        let theta =
-            |a: &f64, n: f64| a + 0.5 * (2.0 * a.to_radians()).sin() + 0.05 * (18.0 * a.to_radians()).cos() + 0.01 * n;
         let mut noise = Noise::new(seed);
-        let recording = Recording {
-            t_s: (0..36).map(f64::from).collect(),
-            theta_deg: Some(angles.iter().map(|a| theta(a, noise.sample())).collect()),
-            table_deg: Some(angles),
-            ..Recording::default()
+        let theta = |degrees: f64| {
+            let a = degrees.to_radians();
+            degrees + 0.5 * (2.0 * a).sin() + 0.05 * (18.0 * a).cos() + 0.01 * noise.sample()
         };
-        run("stations.csv", role, recording)
+        angle_at(angles, theta, role)
     };
     for seed in 0..4 {
         let i = identified(sensor(vec![at(0.0, Role::Fit, seed), at(5.0, Role::Holdout, seed + 20)]));
@@ -116,8 +127,8 @@ fn what_the_radius_shows_is_a_readout_and_not_a_table() {
 #[test]
 fn the_interval_of_the_gain_ratio_holds_it_in_small_campaigns() {
     let mut missed = Vec::new();
-    for seed in 0..40 {
-        let (count, cubic) = if seed % 2 == 0 { (17, 0.0) } else { (36, 0.03) };
+    for seed in 0..60 {
+        let (count, cubic) = [(8, 0.0), (17, 0.0), (36, 0.03)][seed as usize % 3];
         let turn = |role, seed| {
             let angles: Vec<f64> = (0..count).map(|i| f64::from(i) * 360.0 / f64::from(count)).collect();
             let (x, y) = channels(&angles, 1.0, cubic, 1e-3, seed);
@@ -155,5 +166,115 @@ fn a_table_beside_a_readout_widens_the_interval_of_the_gain() {
         let truth = 0.9 * 0.12_f64.cos();
         assert!((ratio.value - truth).abs() < 2.0 * ratio.half_width(), "seed {seed}: {ratio:?}, {truth}");
         assert!(ratio.half_width() < 0.05, "seed {seed}: {ratio:?} says nothing");
+    }
+}
+
+/// A magnetic encoder at the full steps of a motor with 200 a turn: every third quadruple is held out, and of what remains
+/// every `of_them`th step is measured. Full steps of a motor are not alike: two phases (50 per turn), two signs (100).
+fn encoder_at_stations(held: bool, of_them: usize, [phases, signs]: [f64; 2], seed: u64) -> Run {
+    let mut noise = Noise::new(seed);
+    let stations = (0..200).filter(|i| (i / 4 % 3 == 2) == held).step_by(of_them);
+    let theta = |degrees: f64| {
+        let a = degrees.to_radians();
+        let error = 0.15 * (a + 0.3).sin() + 0.1 * (2.0 * a).cos() + 0.04 * (4.0 * a).sin();
+        let motor = phases * (50.0 * a).cos() + signs * (100.0 * a).cos();
+        degrees + error + motor + 0.012 * noise.sample()
+    };
+    angle_at(stations.map(|i| f64::from(i) * 1.8).collect(), theta, role(held))
+}
+
+#[test]
+fn a_hundred_and_thirty_three_stations_are_enough_for_an_encoder() {
+    let of = |held, seed| encoder_at_stations(held, 1, [0.03, 0.02], seed);
+    let i = identified(sensor(vec![of(false, 1), of(true, 2)]));
+    assert!(held_out(&i) < 1.5 * 0.012, "{}° left of 0.012° noise: {:#?}", held_out(&i), i.report.effects);
+    let lines = lines(&i);
+    assert!(lines.contains(&50.0) && lines.contains(&100.0), "{lines:?}");
+    // what belongs to the motor is not replayed
+    assert!(i.calibration.hypothesis.members.is_empty() && i.calibration.hypothesis.angle_table.is_some());
+}
+
+/// 46 stations 5.4° or 12.6° apart: there 11 per turn looks nearly like 50, and 22 and 39 like 100.
+#[test]
+fn stations_at_uneven_distances_tell_a_line_from_its_alias_or_none() {
+    for seed in 0..4 {
+        let of = |held, motor, seed| encoder_at_stations(held, 3, motor, seed);
+        let i = identified(sensor(vec![of(false, [0.13, 0.0], seed), of(true, [0.13, 0.0], seed + 10)]));
+        assert_eq!(lines(&i), [50.0], "seed {seed}");
+        assert!(held_out(&i) < 2.0 * 0.012, "seed {seed}: {}° left of 0.012° noise", held_out(&i));
+        let i = identified(sensor(vec![of(false, [0.012, 0.012], seed), of(true, [0.012, 0.012], seed + 10)]));
+        assert!(lines(&i).iter().all(|n| [50.0, 100.0].contains(n)), "seed {seed}: {:?}", lines(&i));
+    }
+}
+
+/// Two stations of three, over and over: the overtones 16 and 17 of a long table stand in for the line at 50. One of four
+/// hundred encoders, at which a table of sixteen was chosen before the lines were looked for.
+#[test]
+fn a_long_table_does_not_stand_in_for_a_line_where_every_third_station_is_left_out() {
+    const AMPLITUDES_DEG: [(f64, f64); 9] = [
+        (1.0, 0.6),
+        (2.0, 0.03),
+        (4.0, 0.04),
+        (50.0, 0.028),
+        (12.0, 0.014),
+        (48.0, 0.0056),
+        (52.0, 0.0056),
+        (17.0, 0.0084),
+        (16.0, 0.0084),
+    ];
+    let mut noise = Noise::new(800);
+    let waves = AMPLITUDES_DEG.map(|(n, amplitude)| (n, amplitude, 180.0 * noise.sample()));
+    let error = |at: f64| waves.iter().map(|(n, a, phase)| a * (n * at + phase).to_radians().cos()).sum::<f64>();
+    let mut at = |held: bool| {
+        let stations = (0..200).filter(|i| (i % 3 == 2) == held).map(|i| f64::from(i) * 1.8);
+        let signs = |degrees: f64| 0.041 * (100.0 * degrees.to_radians()).cos();
+        angle_at(stations.collect(), |d| d + error(d) + signs(d) + 0.012 * noise.sample(), role(held))
+    };
+    let i = identified(sensor(vec![at(false), at(true)]));
+    assert!(held_out(&i) < 1.6 * 0.012, "{}° left of 0.012° noise, {:?}", held_out(&i), lines(&i));
+    assert!(lines(&i).contains(&50.0), "{:?}", lines(&i));
+}
+
+/// The first and the fourth harmonic at as few stations as carry a table of four.
+#[test]
+fn twenty_seven_stations_carry_four_harmonics() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let mut at = |stations: Vec<u32>, role| {
+            let theta = |degrees: f64| {
+                let a = degrees.to_radians();
+                degrees + 0.3 * (a + 0.3).sin() + 0.3 * (4.0 * a).sin() + 0.012 * noise.sample()
+            };
+            angle_at(stations.into_iter().map(|i| f64::from(i) * 360.0 / 27.0).collect(), theta, role)
+        };
+        let i =
+            identified(sensor(vec![at((0..27).collect(), Role::Fit), at((2..25).step_by(3).collect(), Role::Holdout)]));
+        assert!(held_out(&i) < 2.0 * 0.012, "seed {seed}: {}° left of 0.012° noise", held_out(&i));
+    }
+}
+
+/// Two channels at evenly spaced stations of one turn, of which every third is held out: a gain ratio of 1.166, and
+/// `fourth` deg at four a turn.
+fn every_third_held(stations: u32, held: bool, fourth: f64, noise_v: f64, seed: u64) -> Run {
+    let kept = (0..stations).filter(|i| (i % 3 == 2) == held);
+    let angles: Vec<f64> = kept.map(|i| f64::from(i) * 360.0 / f64::from(stations)).collect();
+    let wrong: Vec<f64> = angles.iter().map(|d| d + fourth * (4.0 * d + 20.0).to_radians().sin()).collect();
+    let (x, y) = channels(&wrong, 1.0, 0.0, noise_v, seed);
+    read_at(angles, x, y.iter().map(|v| 1.1 * v).collect(), role(held))
+}
+
+#[test]
+fn eight_stations_tell_an_ellipse_and_forty_eight_four_harmonics_beside_it() {
+    for seed in 0..6 {
+        let few = [false, true]
+            .map(|held| every_third_held(12, held, 0.0, 0.2_f64.to_radians(), seed + 30 * u64::from(held)));
+        let i = identified(sensor(few.into()));
+        assert!(find(&i, "detection-gain-mismatch").is_some(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 3.0 * 0.2, "seed {seed}: {}° left of 0.2° noise", held_out(&i));
+        let more = [false, true]
+            .map(|held| every_third_held(48, held, 0.3, 0.04_f64.to_radians(), seed + 30 * u64::from(held)));
+        let i = identified(sensor(more.into()));
+        assert!(find(&i, "detection-gain-mismatch").is_some(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 2.0 * 0.04, "seed {seed}: {}° left of 0.04° noise", held_out(&i));
     }
 }

@@ -51,6 +51,19 @@ fn a_gain_that_follows_the_temperature_is_found_with_its_slope() {
     assert!(count(|o| o.1) <= few && count(|o| o.3) <= few, "intervals miss");
 }
 
+/// An afternoon in one room: the runs lie within half a kelvin of one another.
+#[test]
+fn a_gain_that_follows_half_a_kelvin_is_found() {
+    for seed in 0..3 {
+        let (mut settings, _) = device(seed, false);
+        settings.temperature = settings.temperature.map(|t| Temperature { drift_k_per_s: 0.008, step_k: 0.06, ..t });
+        settings.effects.push(effect(EffectId::Temperature, &[-4e-3]));
+        let identified = identify(settings).unwrap();
+        assert_eq!(found(&identified, Origin::Discovered), ["temperature"], "seed {seed}");
+        assert!(over_floor(&identified) < 1.3, "seed {seed}: {:.2} floors", over_floor(&identified));
+    }
+}
+
 /// A wrong unit, or a chamber that was never there: what is stated is not what was recorded.
 #[test]
 fn parameters_stated_far_from_what_was_recorded_are_said_to_be_extrapolated() {

@@ -15,7 +15,8 @@ const VARYING_RATE: f64 = 0.2;
 /// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
 const STRETCHES: usize = 50;
 const EDGE: usize = 30;
-/// Temperatures that differ by less than this are one, K.
+/// Temperatures that differ by less than this are one, K: what a thermometer beside the resonator tells apart. Whether a
+/// temperature or the time explains what changed is for the likelihood to say.
 const SAME_TEMPERATURE_K: f64 = 0.25;
 
 /// Rates of the table over short stretches of one segment after the other, rad/s; stops left out.
