@@ -43,6 +43,9 @@ const FEWEST: usize = 20;
 const SAME_COMMAND: f64 = 0.1;
 /// Rounds in which a decay's rate and the work of the quadrature command settle: each leaves a few hundredths of the last.
 const WORK_ROUNDS: usize = 4;
+/// Standard deviation of that work as a share of it: the ellipticity is read through whatever reaches the quadrature channels
+/// besides, as a feed-through of the drives does.
+const WORK_KNOWN_TO: f64 = 0.1;
 /// Points of the decay that are kept for the report.
 const KEPT_POINTS: usize = 400;
 
@@ -137,7 +140,8 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
 /// the ellipse that the quadrature loop leaves while the amplitude falls. `hold` is the v_as/a that balances this
 /// damping, so that G = −1/(τ·hold).
 fn damping(off: &Phase, hold: impl Fn(f64) -> f64) -> (f64, f64) {
-    let (mut rate, mut error, _) = decay_rate(&off.t_s, &off.ln_a);
+    let (as_seen, as_seen_error, _) = decay_rate(&off.t_s, &off.ln_a);
+    let (mut rate, mut error) = (as_seen, as_seen_error);
     for _ in 0..WORK_ROUNDS {
         let gain = -rate / hold(rate);
         // a loop that was never on tells no gain, and does no work that is known
@@ -145,7 +149,7 @@ fn damping(off: &Phase, hold: impl Fn(f64) -> f64) -> (f64, f64) {
         let undriven: Vec<f64> = off.ln_a.iter().zip(&off.command).map(|(ln_a, work)| ln_a - gain * work).collect();
         (rate, error, _) = decay_rate(&off.t_s, &undriven);
     }
-    (rate, error)
+    (rate, error.hypot(WORK_KNOWN_TO * (rate - as_seen)))
 }
 
 /// Evaluates a ring-down after undoing the readout effects of `hypothesis`.
