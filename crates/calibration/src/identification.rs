@@ -19,7 +19,6 @@ use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
-use crate::estimation::ring_down_agreement::Anisodamping;
 use crate::free_decay;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::{Campaign, Reference, Role, RunKind};
@@ -160,13 +159,18 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     dataset.written.clone_from(&options.effects);
     (options.progress)("fitting the declared model");
     let paper = declared_hypothesis(&dataset.start);
-    dataset.without_foreign_ring_downs(&paper, Anisodamping::Open)?;
-    let declared = fit_with_ring_downs(&mut dataset, &paper)?;
-    let declared_fit = declared.fit.clone();
-    let (mut fitted, mut steps) =
-        if options.discover { discover(&mut dataset, declared, options.progress)? } else { (declared, Vec::new()) };
-    if dataset.without_foreign_ring_downs(&fitted.fit.hypothesis, Anisodamping::Fitted)? {
-        fitted = fit_with_ring_downs(&mut dataset, &fitted.fit.hypothesis)?;
+    dataset.require_driven_rotations(&paper)?;
+    let explained = |dataset: &mut Dataset| {
+        let declared = fit_with_ring_downs(dataset, &paper)?;
+        let declared_fit = declared.fit.clone();
+        let (fitted, steps) =
+            if options.discover { discover(dataset, declared, options.progress)? } else { (declared, Vec::new()) };
+        Ok::<_, Refusal>((declared_fit, fitted, steps))
+    };
+    let (mut declared_fit, mut fitted, mut steps) = explained(&mut dataset)?;
+    if dataset.without_foreign_ring_downs(&fitted.fit.hypothesis)? {
+        (options.progress)("beginning anew without the ring-downs of another device");
+        (declared_fit, fitted, steps) = explained(&mut dataset)?;
     }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
