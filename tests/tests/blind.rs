@@ -269,6 +269,13 @@ fn a_cause_that_a_larger_effect_hid_is_named_in_the_end() {
     named_without_a_flaw(&BALANCED, 73);
 }
 
+/// The declared fit had to set a fifth of the samples aside, and one step from it promised nothing of the saturation.
+#[test]
+fn a_cause_that_promised_little_at_first_is_tried_before_none_is_named() {
+    let o = outcome(&BALANCED, 82, None);
+    assert!(o.flawless(), "{}\n    {}", o.answer, o.details);
+}
+
 /// What holds the pattern works on the amplitude through a skew of the drives, so that ring-downs of one sound device differ
 /// by a third in their damping.
 #[test]

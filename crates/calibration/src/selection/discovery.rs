@@ -136,24 +136,11 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
         return Ok(None);
     }
     let base = refit(dataset, fitted, &fitted.fit.hypothesis, CAREFUL);
-    ranked.truncate(FINALISTS);
-    let mut trials: Vec<Trial> = ranked
-        .into_par_iter()
-        .map(|quick| Trial { fit: refit(dataset, fitted, &quick.fit.hypothesis, CAREFUL), ..quick })
-        .collect();
-    let Some(best) = trials.iter().min_by(|a, b| mean_square(&a.fit).total_cmp(&mean_square(&b.fit))) else {
-        return Ok(None);
-    };
-    // Autocorrelation that even the best candidate leaves makes samples worth less.
-    let after = evaluate(&dataset.tracks, &best.fit.hypothesis, &best.fit.starts, Role::Fit, Window::Whole, None);
-    let worth = 1.0 / sample_cost(&after);
-    for t in &mut trials {
-        let n = worth * count(&t.fit);
-        t.gain = n * (mean_square(&base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
+    let mut trials = tried_carefully(dataset, fitted, &ranked[..FINALISTS.min(ranked.len())], &base);
+    if dataset.excess() >= NOTHING_LEFT && trials.iter().all(|t| t.gain < LEAST_GAIN) {
+        // where the fit had to set much aside, one step from it promises little of the cause
+        trials = tried_carefully(dataset, fitted, &ranked, &base);
     }
-    // an effect as text may have no value where the refit led it
-    trials.retain(|t| t.gain.is_finite());
-    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let apart = Distinguishable::on(dataset);
     let balance_before = balance(dataset, &base);
     let before_it = Before::of(dataset, &fitted.fit);
@@ -184,6 +171,27 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
         };
         return Ok(Some((next, step)));
     }
+}
+
+/// Candidates refitted in full beside a base that was refitted as well, best first.
+fn tried_carefully(dataset: &Dataset, fitted: &Fitted, quick: &[Trial], base: &Fit) -> Vec<Trial> {
+    let careful =
+        |quick: &Trial| Trial { fit: refit(dataset, fitted, &quick.fit.hypothesis, CAREFUL), ..quick.clone() };
+    let mut trials: Vec<Trial> = quick.par_iter().map(careful).collect();
+    let Some(best) = trials.iter().min_by(|a, b| mean_square(&a.fit).total_cmp(&mean_square(&b.fit))) else {
+        return trials;
+    };
+    // Autocorrelation that even the best candidate leaves makes samples worth less.
+    let after = evaluate(&dataset.tracks, &best.fit.hypothesis, &best.fit.starts, Role::Fit, Window::Whole, None);
+    let worth = 1.0 / sample_cost(&after);
+    for t in &mut trials {
+        let n = worth * count(&t.fit);
+        t.gain = n * (mean_square(base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
+    }
+    // an effect as text may have no value where the refit led it
+    trials.retain(|t| t.gain.is_finite());
+    trials.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    trials
 }
 
 /// Asks the energy balance about the trials that may be chosen, and at one rate about those they have to be told from.
