@@ -285,6 +285,12 @@ fn ring_downs_through_skewed_drives_are_of_one_device() {
     }
 }
 
+/// Beside a split of 2.5 Hz the rotations take twice the command of the ring-downs, of which one was recorded warmer.
+#[test]
+fn ring_downs_that_all_take_less_than_the_rotations_are_kept() {
+    named_without_a_flaw(&ELECTRONICS, 20_016);
+}
+
 /// From a split of zero the declared fit of this campaign ended beyond another minimum, and of its two effects one was never
 /// named.
 #[test]

@@ -61,27 +61,19 @@ impl Dataset {
         let usual = self.usual_drive(hypothesis);
         let through_skew = through_skew(hypothesis);
         let usual = usual.filter(|d| *d > 0.0);
+        let share = |r: &RingDown| usual.map(|usual| -r.drive / usual - 1.0);
+        let is_off = |share: &f64| share.abs() > LARGEST_SHARE + through_skew;
         let mut odd: Vec<(usize, String)> = Vec::new();
-        for (at, r) in all.iter().enumerate() {
-            let Some(share) =
-                usual.map(|usual| -r.drive / usual - 1.0).filter(|s| s.abs() > LARGEST_SHARE + through_skew)
-            else {
-                continue;
-            };
-            if !self.differs_in_temperature(&self.ring_down_runs[at]) {
-                odd.push((
-                    at,
-                    format!(
-                        "it takes {:.1} % {} energy command per amplitude than the rotations",
-                        100.0 * share.abs(),
-                        if share > 0.0 { "more" } else { "less" }
-                    ),
-                ));
-            }
-        }
-        if odd.len() == all.len() {
-            // the rotations may be what is odd: beside a large split they take more
-            odd.clear();
+        // where no ring-down agrees with them, the rotations are what is odd: beside a large split they take more
+        if all.iter().any(|r| share(r).is_some_and(|s| !is_off(&s))) {
+            let off = all.iter().enumerate().filter_map(|(at, r)| Some((at, share(r).filter(is_off)?)));
+            odd.extend(off.filter(|(at, _)| !self.differs_in_temperature(&self.ring_down_runs[*at])).map(
+                |(at, share)| {
+                    let direction = if share > 0.0 { "more" } else { "less" };
+                    let percent = 100.0 * share.abs();
+                    (at, format!("it takes {percent:.1} % {direction} energy command per amplitude than the rotations"))
+                },
+            ));
         }
         if odd.is_empty() && self.tracks_differ() {
             odd = contradictions(&all, hypothesis, usual);
