@@ -71,6 +71,27 @@ fn what_holds_a_large_split_is_not_taken_for_damping() {
     assert!((found.parameters[0].value / 0.012 - 1.0).abs() < 0.01, "{found:?}");
 }
 
+/// A gain that jumps by a percent on the way is in the slope of the logarithm as well.
+#[test]
+fn a_decay_that_is_not_exponential_is_named_and_its_interval_covers_it() {
+    for (file, share) in [("ringdown-90.csv", 0.5), ("ringdown-0.csv", 0.6), ("ringdown-90.csv", 0.8)] {
+        let mut campaign = recorded(settings());
+        let run = ring_downs(&mut campaign).into_iter().find(|r| r.file.ends_with(file)).unwrap();
+        let r = &mut run.recording;
+        let columns = if file == "ringdown-0.csv" { [&mut r.xc_v, &mut r.xs_v] } else { [&mut r.yc_v, &mut r.ys_v] };
+        for v in columns.into_iter().flatten() {
+            let from = (share * v.len() as f64) as usize;
+            v[from..].iter_mut().for_each(|v| *v *= 1.01);
+        }
+        let report = identified(campaign).unwrap().report;
+        let told = |w: &String| w.contains(file) && w.contains("does not decay exponentially");
+        let is_left_out = report.runs.iter().any(|r| r.file == file && r.r#use == "left out");
+        assert!(is_left_out || report.warnings.iter().any(told), "{file} from {share}: {:?}", report.warnings);
+        let ratio = report.actuation_gain_ratio;
+        assert!(ratio.is_none_or(|ratio| holds(&ratio, RATIO)), "{file} from {share}: {ratio:?}");
+    }
+}
+
 /// A recording that begins after the energy loop was switched off holds a decay and no command.
 #[test]
 fn a_ring_down_without_its_beginning_is_refused() {

@@ -25,6 +25,8 @@ pub struct RingDown {
     pub tau_s: f64,
     /// its standard error, s
     pub tau_error_s: f64,
+    /// rms of what is left of ln a about an exponential decay, beyond noise
+    pub uneven: f64,
     /// energy control output per unit of true amplitude, corrected for the amplitude's own trend, 1/1
     pub drive: f64,
     /// its standard error
@@ -46,6 +48,8 @@ const WORK_ROUNDS: usize = 4;
 /// Standard deviation of that work as a share of it: the ellipticity is read through whatever reaches the quadrature channels
 /// besides, as a feed-through of the drives does.
 const WORK_KNOWN_TO: f64 = 0.1;
+/// Blocks of neighbouring samples whose means tell what the noise of a ring-down remembers.
+const BLOCKS: usize = 12;
 /// Points of the decay that are kept for the report.
 const KEPT_POINTS: usize = 400;
 
@@ -136,20 +140,19 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
     Ok(found)
 }
 
-/// The damping that a decay shows, 1/s, and its standard error: ȧ/a = −1/τ + G v_qc q/a², for what holds a split works on
-/// the ellipse that the quadrature loop leaves while the amplitude falls. `hold` is the v_as/a that balances this
-/// damping, so that G = −1/(τ·hold).
-fn damping(off: &Phase, hold: impl Fn(f64) -> f64) -> (f64, f64) {
-    let (as_seen, as_seen_error, _) = decay_rate(&off.t_s, &off.ln_a);
-    let (mut rate, mut error) = (as_seen, as_seen_error);
+/// The damping that a decay shows: ȧ/a = −1/τ + G v_qc q/a², for what holds a split works on the ellipse that the
+/// quadrature loop leaves while the amplitude falls. `hold` is the v_as/a that balances this damping, so that G = −1/(τ·hold).
+fn damping(off: &Phase, hold: impl Fn(f64) -> f64) -> Decay {
+    let as_seen = Decay::of(&off.t_s, &off.ln_a);
+    let mut decay = as_seen;
     for _ in 0..WORK_ROUNDS {
-        let gain = -rate / hold(rate);
+        let gain = -decay.rate / hold(decay.rate);
         // a loop that was never on tells no gain, and does no work that is known
         let gain = if gain.is_finite() { gain } else { 0.0 };
         let undriven: Vec<f64> = off.ln_a.iter().zip(&off.command).map(|(ln_a, work)| ln_a - gain * work).collect();
-        (rate, error, _) = decay_rate(&off.t_s, &undriven);
+        decay = Decay::of(&off.t_s, &undriven);
     }
-    (rate, error.hypot(WORK_KNOWN_TO * (rate - as_seen)))
+    Decay { error: decay.error.hypot(WORK_KNOWN_TO * (decay.rate - as_seen.rate)), ..decay }
 }
 
 /// Evaluates a ring-down after undoing the readout effects of `hypothesis`.
@@ -189,7 +192,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         );
     }
     loop {
-        let (rate, _, intercept) = decay_rate(&off.t_s, &off.ln_a);
+        let Decay { rate, intercept, .. } = Decay::of(&off.t_s, &off.ln_a);
         if !off.drop_spikes(|t| intercept - rate * t) || off.len() < FEWEST {
             break;
         }
@@ -200,8 +203,9 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     let (trend, _) = line(&on.t_s, &on.ln_a);
     let mean = on.command.iter().sum::<f64>() / on.len() as f64;
     let hold = |rate: f64| mean * rate / (rate + trend);
-    let (rate, rate_error) = damping(&off, hold);
-    if rate <= 3.0 * rate_error {
+    let decayed = damping(&off, hold);
+    let rate = decayed.rate;
+    if rate <= 3.0 * decayed.error {
         return refuse(
             format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
             "a ring-down with the energy loop off",
@@ -211,7 +215,8 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         name,
         angle_rad: angle_rad + middle,
         tau_s: 1.0 / rate,
-        tau_error_s: rate_error / (rate * rate),
+        tau_error_s: decayed.error.hypot(decayed.uneven_error) / (rate * rate),
+        uneven: decayed.uneven,
         drive: hold(rate),
         drive_error: STUDENT_11 * mean_error(&on.command, mean),
         decay,
@@ -262,22 +267,62 @@ fn command_that_goes_on(run: &Run, settled: std::ops::Range<usize>, energy_off_s
     instead.then(|| "vqc_v vanishes at energy_off_s, and vas_v does not: the two are exchanged".into())
 }
 
-/// Decay rate of an amplitude from its logarithm, 1/s, its standard error, and the intercept: weighted by the squared amplitude, since
-/// the readout's noise is constant.
-fn decay_rate(t: &[f64], ln_a: &[f64]) -> (f64, f64, f64) {
-    let weight: Vec<f64> = ln_a.iter().map(|l| (2.0 * (l - ln_a[0])).exp()).collect();
-    let sum: f64 = weight.iter().sum();
-    let mean = |v: &[f64]| v.iter().zip(&weight).map(|(v, w)| v * w).sum::<f64>() / sum;
-    let (mt, ml) = (mean(t), mean(ln_a));
-    let (mut stt, mut stl) = (0.0, 0.0);
-    for ((t, l), w) in t.iter().zip(ln_a).zip(&weight) {
-        stt += w * (t - mt) * (t - mt);
-        stl += w * (t - mt) * (l - ml);
+/// An exponential decay, fitted to the logarithm of an amplitude.
+#[derive(Debug, Clone, Copy)]
+struct Decay {
+    /// 1/s
+    rate: f64,
+    /// its standard error by white noise, 1/s
+    error: f64,
+    /// ln a at time zero
+    intercept: f64,
+    /// rms of what is left in the means of [`BLOCKS`] blocks, beyond what white noise leaves there
+    uneven: f64,
+    /// the rate that such a rms would make if it went with time, 1/s: nothing tells how much of it did
+    uneven_error: f64,
+}
+
+impl Decay {
+    /// Weighted by the squared amplitude, since the readout's noise is constant.
+    fn of(t: &[f64], ln_a: &[f64]) -> Self {
+        let weight: Vec<f64> = ln_a.iter().map(|l| (2.0 * (l - ln_a[0])).exp()).collect();
+        let sum: f64 = weight.iter().sum();
+        let mean = |v: &[f64]| v.iter().zip(&weight).map(|(v, w)| v * w).sum::<f64>() / sum;
+        let (mt, ml) = (mean(t), mean(ln_a));
+        let (mut stt, mut stl) = (0.0, 0.0);
+        for ((t, l), w) in t.iter().zip(ln_a).zip(&weight) {
+            stt += w * (t - mt) * (t - mt);
+            stl += w * (t - mt) * (l - ml);
+        }
+        let slope = stl / stt;
+        let left: Vec<f64> = t.iter().zip(ln_a).map(|(t, l)| l - ml - slope * (t - mt)).collect();
+        let rest: f64 = left.iter().zip(&weight).map(|(r, w)| w * r * r).sum();
+        // of one sample at full weight
+        let noise = rest / (t.len() as f64 - 2.0);
+        let uneven = unevenness(&left, &weight, noise);
+        Self {
+            rate: -slope,
+            error: (noise / stt).sqrt(),
+            intercept: ml - slope * mt,
+            uneven,
+            uneven_error: uneven * (sum / stt).sqrt(),
+        }
     }
-    let slope = stl / stt;
-    let rest: f64 =
-        t.iter().zip(ln_a).zip(&weight).map(|((t, l), w)| w * (l - ml - slope * (t - mt)).powi(2)).sum::<f64>();
-    (-slope, (rest / (t.len() as f64 - 2.0) / stt).sqrt(), ml - slope * mt)
+}
+
+/// rms of the weighted means of blocks of `left`, beyond what residuals of variance `noise`/weight leave there if they are white.
+fn unevenness(left: &[f64], weight: &[f64], noise: f64) -> f64 {
+    let size = left.len().div_ceil(BLOCKS);
+    let (mut squares, mut by_noise, mut sum) = (0.0, 0.0, 0.0);
+    for (left, weight) in left.chunks(size).zip(weight.chunks(size)) {
+        let total: f64 = weight.iter().sum();
+        squares += left.iter().zip(weight).map(|(r, w)| r * w).sum::<f64>().powi(2) / total;
+        by_noise += noise;
+        sum += total;
+    }
+    // white noise leaves 11 ± 5 of its own variance in twelve blocks: beyond 2.33 deviations of that it is none
+    let by_chance = by_noise * (1.0 + 2.33 * (2.0 / BLOCKS as f64).sqrt());
+    if squares > by_chance { ((squares - by_noise) / sum).sqrt() } else { 0.0 }
 }
 
 /// Samples of ln a that lie within six robust deviations of what is expected, in volts rather than in ln a.
@@ -298,7 +343,6 @@ const STUDENT_11: f64 = 2.201 / 1.960;
 
 /// Standard error of a mean from means of blocks: neighbouring samples of a loop's output are not independent.
 fn mean_error(values: &[f64], mean: f64) -> f64 {
-    const BLOCKS: usize = 12;
     let size = (values.len() / BLOCKS).max(1);
     let blocks: Vec<f64> = values.chunks_exact(size).map(|b| b.iter().sum::<f64>() / b.len() as f64).collect();
     let n = blocks.len() as f64;

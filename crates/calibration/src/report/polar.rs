@@ -10,8 +10,8 @@ const NORMAL: f64 = 1.96;
 /// Magnitude √(c² + s²), and angle atan2(s, c)/`division` in degrees, of parameters with variances and covariance
 /// (c, s, both).
 ///
-/// Intervals are by propagation, and that of the angle reaches at least as far as Fieller's (1954), which has all directions along
-/// which the data may lie: where the magnitude may be nothing it goes all around.
+/// Intervals are by propagation. That of the angle reaches at least as far as Fieller's
+/// (1954), which has all directions along which the data may lie, and at most all around, as where the magnitude may be nothing.
 pub(crate) fn polar([c, s]: [f64; 2], (vc, vs, vcs): (f64, f64, f64), division: f64) -> (Estimate, Estimate) {
     let size = c.hypot(s).max(f64::MIN_POSITIVE);
     let (cos, sin) = (c / size, s / size);
@@ -23,14 +23,24 @@ pub(crate) fn polar([c, s]: [f64; 2], (vc, vs, vcs): (f64, f64, f64), division: 
     let (bend, slant) = (size * size - NORMAL * NORMAL * along, (NORMAL * NORMAL * between).abs());
     let square = slant * slant + bend * NORMAL * NORMAL * across;
     let farthest = if square >= 0.0 { (slant + square.sqrt()).atan2(bend) } else { PI };
-    let by_propagation = Estimate::new((s.atan2(c) / division).to_degrees(), (turn / division).to_degrees());
-    let beyond = (farthest - NORMAL * turn).max(0.0);
-    (Estimate::new(c.hypot(s), along.sqrt()), by_propagation.widened((beyond / division).to_degrees()))
+    let reach = farthest.max(NORMAL * turn).min(PI);
+    let degrees = |turned: f64| (turned / division).to_degrees();
+    let angle =
+        Estimate { value: degrees(s.atan2(c)), ci95: [degrees(s.atan2(c) - reach), degrees(s.atan2(c) + reach)] };
+    (Estimate::new(c.hypot(s), along.sqrt()), angle)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_angle_is_less_certain_than_all_around() {
+        for deviation in [1e-4, 1e-3, 1.0, 1e3] {
+            let (_, angle) = polar([1e-4, -2e-4], (deviation * deviation, 0.3, 0.0), 2.0);
+            assert!((angle.ci95[1] - angle.ci95[0] - 180.0).abs() < 1e-9, "{:?}", angle.ci95);
+        }
+    }
 
     #[test]
     fn the_angle_of_a_magnitude_that_may_be_nothing_is_within_its_interval() {

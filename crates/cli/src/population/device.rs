@@ -11,6 +11,8 @@ use crate::compare::{Parameter, of_report};
 
 /// Standard deviations between the ends of a 95 % interval.
 const ENDS: f64 = 2.0 * 1.96;
+/// An interval of this width, in the angle of a magnitude's two parts, is all around; a thousandth of it for rounding.
+const ALL_AROUND_DEG: f64 = 360.0 * 0.999;
 
 /// What is kept of a report; the rest is many times as large, and thousands of devices are in memory at once.
 const KEPT: [&str; 12] = [
@@ -163,11 +165,13 @@ fn angle_of<'p>(p: &Parameter, all: &'p [Parameter]) -> Option<(&'p Parameter, f
     Some((all.iter().find(|other| other.name == format!("{effect}.{angle}"))?, division))
 }
 
-/// Cosine and sine part of a magnitude and its angle, as the fit has them.
+/// Cosine and sine part of a magnitude and its angle, as the fit has them. An angle that may be anything says nothing of how far
+/// off they are sideways: as far as along the angle.
 fn parts(p: &Parameter, size: Measured, angle: &Parameter, division: f64) -> [Quantity; 2] {
     let turned = (division * angle.value).to_radians();
     let width = angle.ci95.map_or(0.0, |[low, high]| (high - low).abs() / ENDS);
-    let across = size.value * division * width.to_radians();
+    let by_the_angle = size.value * division * width.to_radians();
+    let across = if division * width * ENDS < ALL_AROUND_DEG { by_the_angle } else { by_the_angle.max(size.error) };
     let (sin, cos) = turned.sin_cos();
     let part = |name: &str, along: f64, sideways: f64| Quantity {
         name: format!("{} ({name} part)", p.name),
