@@ -186,10 +186,12 @@ def test_an_answer_is_kept_only_where_it_is_to_the_same_question(lake, tmp_path,
     pyarrow.parquet.write_table(changed, path)
     assert fleet.identify_lake(path, out)["device"].to_pylist() == ["unit-00", "unit-01"] and asked == ["unit-00"]
     asked.clear()
-    # another version
-    monkeypatch.setattr(fleet._cvg, "__version__", "0.0.0")
-    fleet.identify_lake(path, out)
-    assert asked == ["unit-00", "unit-01"]
+    # another version, and another build of it
+    for name, value in (("__version__", "0.0.0"), ("__file__", str(effect))):
+        monkeypatch.setattr(fleet._cvg, name, value)
+        fleet.identify_lake(path, out)
+        assert asked == ["unit-00", "unit-01"], name
+        asked.clear()
     # what is not of ours
     pyarrow.parquet.write_table(pyarrow.table({"device": ["unit-00"]}), out)
     assert len(fleet.identify_lake(path, out)) == 2
@@ -204,6 +206,9 @@ def test_devices_have_names_of_any_type(lake, tmp_path):
         "float": (pc.cast(numbers, pyarrow.float64()), ["11", "9"]),
         "dictionary": (few["device"].dictionary_encode(), ["unit-00", "unit-01"]),
         "null": (pc.if_else(second, None, few["device"]), ["", "unit-00"]),
+        "large": (pc.cast(few["device"], pyarrow.large_string()), ["unit-00", "unit-01"]),
+        # what polars hands out
+        "view": (pc.cast(few["device"], pyarrow.string_view()), ["unit-00", "unit-01"]),
     }.items():
         column, expected = names
         path, out = tmp_path / f"{kind}.parquet", tmp_path / f"{kind}-answers.parquet"
@@ -220,11 +225,72 @@ def test_devices_have_names_of_any_type(lake, tmp_path):
                 assert "rows have no `device`" in row["reason"]
 
 
+def test_a_lake_is_not_written_over_and_answers_are_no_part_of_it(lake, tmp_path):
+    few = lake.filter(pc.equal(lake["device"], "unit-00"))
+    folder = tmp_path / "lake"
+    folder.mkdir()
+    path = folder / "lake.parquet"
+    pyarrow.parquet.write_table(few, path)
+    before = path.read_bytes()
+    os.link(path, tmp_path / "linked.parquet")
+    for source, out in ((path, path), (path, tmp_path / "linked.parquet"), (folder, folder / "answers.parquet"), (folder, path)):
+        with pytest.raises(cvg.InputError, match="is a part of the lake") as raised:
+            fleet.identify_lake(source, out)
+        assert raised.value.file == str(out) and path.read_bytes() == before
+    assert os.listdir(folder) == ["lake.parquet"]
+
+
+def test_a_table_of_any_library_is_one(lake):
+    import polars
+
+    few = lake.filter(pc.is_in(lake["device"], pyarrow.array(["unit-00", "unit-01"])))
+    expected = fleet.identify_table(few)
+    for table in (polars.from_arrow(few), few.to_pandas(), few.combine_chunks().to_batches()[0]):
+        assert fleet.identify_table(table).equals(expected), type(table)
+    [first, _] = fleet.devices(polars.from_arrow(few))
+    assert fleet.identify_device(first[1]).equals(expected.slice(0, 1))
+
+
+def test_a_wrong_call_is_an_error_and_no_row(lake, tmp_path):
+    path, out = tmp_path / "lake.parquet", tmp_path / "answers.parquet"
+    one = lake.filter(pc.equal(lake["device"], "unit-00"))
+    pyarrow.parquet.write_table(one, path)
+    calls = (
+        lambda **options: fleet.identify_device(one, **options),
+        lambda **options: fleet.identify_table(one, **options),
+        lambda **options: fleet.identify_lake(path, out, **options),
+    )
+    for call in calls:
+        with pytest.raises(TypeError, match="`colour` is no option of a fleet"):
+            call(colour=1)
+        with pytest.raises(TypeError, match="`campaign` is no option"):
+            call(campaign={"carrier_hz": 15200.0})
+        with pytest.raises(cvg.InputError, match="limits"):
+            call(limits={"angular_gain.value": {"max": 1.0}})
+    # what an answer is kept by has to be told from another
+    with pytest.raises(cvg.InputError, match="holdout: Table is no path"):
+        fleet.identify_lake(path, out, holdout=one)
+    with pytest.raises(cvg.InputError, match="nowhere.toml: cannot be read"):
+        fleet.identify_lake(path, out, effects="nowhere.toml")
+    lists = one.drop_columns("device").append_column("device", pyarrow.array([[1]] * len(one)))
+    for table, what in ((one.drop_columns("device"), "no column `device`"), (lists, "is of the type list")):
+        pyarrow.parquet.write_table(table, path)
+        with pytest.raises(cvg.InputError, match=what):
+            fleet.identify_lake(path, out)
+        with pytest.raises(cvg.InputError, match=what):
+            fleet.identify_table(table)
+    assert not out.exists()
+    assert fleet.population([])["devices"] == 0
+
+
 def test_rows_that_cannot_be_one_device_are_a_row_that_says_so(lake):
     [row] = fleet.identify_device(lake).to_pylist()
     assert row["status"] == "refused" and "`device` has 11 values" in row["reason"]
     [row] = fleet.identify_device({"t_s": [0.0, 1.0]}).to_pylist()
     assert row["status"] == "refused" and "rotation" in row["reason"] or "recording" in row["reason"]
+    for nothing in ([1, 2], None, 5):
+        [row] = fleet.identify_device(nothing).to_pylist()
+        assert row["status"] == "refused" and "is no table" in row["reason"]
     assert len(fleet.identify_table(lake.slice(0, 0))) == 0
 
 

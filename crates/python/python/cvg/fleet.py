@@ -7,12 +7,13 @@ call it as it is; `identify_table` answers a table of several devices, one after
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import os
 import pathlib
 import time
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -76,6 +77,58 @@ def _refused(device: str, reason: str, report: str | None) -> dict[str, Any]:
     return {"device": device, "status": "refused", "reason": reason, "report": report}
 
 
+def _plain_type(kind: pa.DataType) -> pa.DataType:
+    """The type that Arrow's functions have for what polars hands out as views."""
+    views = {pa.string_view(): pa.string(), pa.binary_view(): pa.binary()}
+    return views.get(kind, kind)
+
+
+def _plain_schema(schema: pa.Schema) -> pa.Schema:
+    return pa.schema([field.with_type(_plain_type(field.type)) for field in schema])
+
+
+def _table(x: Any) -> pa.Table:
+    """A table of what is one in another library."""
+    try:
+        table = x if isinstance(x, pa.Table) else pa.table(x)
+    except (pa.ArrowException, TypeError, ValueError) as error:
+        raise InputError(f"{type(x).__name__} is no table: {error}; wanted an Arrow table, a frame or columns") from None
+    return table.cast(_plain_schema(table.schema))
+
+
+def _require_devices(schema: pa.Schema, of: str) -> None:
+    """Refuses what has no column that tells devices apart."""
+    if DEVICE not in schema.names:
+        raise InputError(f"{of}: there is no column `{DEVICE}`, which tells devices apart; there are {', '.join(schema.names)}")
+    kind = schema.field(DEVICE).type
+    if pa.types.is_nested(kind):
+        raise InputError(f"{of}: `{DEVICE}` is of the type {kind}; wanted names or numbers")
+
+
+class _Lake(NamedTuple):
+    """The rows of a lake, as types that Arrow's functions take, and the type that it has devices in."""
+
+    rows: dataset.Dataset
+    kind: pa.DataType
+
+
+def _lake(lake: Path) -> _Lake:
+    source = dataset.dataset(lake)
+    _require_devices(source.schema, os.fspath(lake))
+    plain = _plain_schema(source.schema)
+    rows = source if plain == source.schema else dataset.dataset(lake, schema=plain)
+    return _Lake(rows, source.schema.field(DEVICE).type)
+
+
+def _require_options(options: dict[str, Any]) -> None:
+    """Refuses options that no device could be answered with: they are the call's fault, and no device's."""
+    if options.get("limits") is not None:
+        raise InputError("limits: a row does not say how they were met; wanted cvg.identify, or `cvg fleet --limits`")
+    known = [name for name in inspect.signature(identify).parameters if name not in ("x", "limits", "name", "campaign")]
+    for name in options.keys() - {*known, "limits"}:
+        raise TypeError(f"`{name}` is no option of a fleet; there are {', '.join(known)}")
+
+
 def _one(table: pa.Table, name: str, of: str) -> Any:
     """The value that a column has in all rows."""
     values = pc.unique(table[name]).to_pylist()
@@ -120,16 +173,15 @@ def identify_device(x: Any, **options: Any) -> pa.Table:
 
     `x` is the path of a campaign or a recording, or an Arrow table (or what `pyarrow.table` makes one of) of one device's
     rows, with its recordings told apart by a column `run`. `options` are those of `cvg.identify`, but for `limits`, of which a row
-    says nothing.
+    says nothing, and for `name` and `campaign`, which the table says.
     """
-    if options.get("limits") is not None:
-        raise InputError("limits: a row does not say how they were met; wanted cvg.identify, or `cvg fleet --limits`")
+    _require_options(options)
     device = os.fspath(x) if is_path(x) else "device"
     try:
         if is_path(x):
             row = _answered(identify(x, **options))
         else:
-            table = x if isinstance(x, pa.Table) else pa.table(x)
+            table = _table(x)
             if DEVICE in table.column_names:
                 device = str(_one(pa.table({DEVICE: _names(table[DEVICE])}), DEVICE, "a device's table"))
                 if not device:
@@ -143,41 +195,45 @@ def identify_device(x: Any, **options: Any) -> pa.Table:
     return pa.Table.from_pylist([row], schema=SCHEMA)
 
 
-def devices(table: pa.Table) -> Iterator[tuple[str, pa.Table]]:
+def devices(x: Any) -> Iterator[tuple[str, pa.Table]]:
     """The devices in a table and their rows, in the order in which they begin."""
+    table = _table(x)
+    _require_devices(table.schema, "the table")
     named = _names(table[DEVICE])
     for device in pc.unique(named).to_pylist():
         yield str(device), table.filter(pc.equal(named, device))
 
 
-def identify_table(table: pa.Table, **options: Any) -> pa.Table:
+def identify_table(x: Any, **options: Any) -> pa.Table:
     """Answers every device in a table, which holds all rows of each: a row of `SCHEMA` for each."""
-    rows = [identify_device(own, **options) for _, own in devices(table)]
+    _require_options(options)
+    rows = [identify_device(own, **options) for _, own in devices(x)]
     return pa.concat_tables(rows) if rows else SCHEMA.empty_table()
 
 
 def names(lake: Path) -> list[str]:
     """The devices in a lake: a Parquet file, or a folder of them."""
-    column = dataset.dataset(lake).to_table(columns=[DEVICE])[DEVICE]
+    column = _lake(lake).rows.to_table(columns=[DEVICE])[DEVICE]
     return sorted(pc.unique(_names(column)).to_pylist())
 
 
 def identify_in(lake: Path, device: str, **options: Any) -> pa.Table:
     """Answers one device of a lake, of which no other row is kept."""
-    return identify_device(_rows(dataset.dataset(lake), device), **options)
+    return identify_device(_rows(_lake(lake), device), **options)
 
 
-def _rows(rows: dataset.Dataset, device: str) -> pa.Table:
+def _rows(lake: _Lake, device: str) -> pa.Table:
     """The rows of a device of a lake."""
-    column, kind = pc.field(DEVICE), rows.schema.field(DEVICE).type
+    column, kind = pc.field(DEVICE), lake.kind
     if not device:
-        return rows.to_table(filter=column.is_null() | (column.cast(pa.string()) == ""))
+        return lake.rows.to_table(filter=column.is_null() | (column.cast(pa.string()) == ""))
     if pa.types.is_integer(kind):
         # by their numbers, by which row groups that have others are left unread
-        return rows.to_table(filter=column == pa.scalar(int(device), kind))
+        return lake.rows.to_table(filter=column == pa.scalar(int(device), kind))
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
-        return rows.to_table(filter=column == device)
-    return rows.to_table(filter=column.cast(pa.string()) == device)
+        return lake.rows.to_table(filter=column == device)
+    # what a row group says of its values cannot be compared with views
+    return lake.rows.to_table(filter=column.cast(pa.large_string()) == device)
 
 
 def identify_lake(lake: Path, out: Path, **options: Any) -> pa.Table:
@@ -185,13 +241,16 @@ def identify_lake(lake: Path, out: Path, **options: Any) -> pa.Table:
 
     Answers that `out` has are kept where they rest on the same rows, the same options and the same version of `cvg`, so that a
     run that was broken off goes on where it was. What was answered is written whenever that takes little of the time, and
-    where it ends, be it by an exception. Two programs at a time want two files.
+    where it ends, be it by an exception. Two programs at a time want two files. `out` lies outside of the lake.
     """
+    _require_options(options)
     target = os.fspath(out)
+    source = _lake(lake)
+    if any(_is_within(target, part) for part in (lake, *getattr(source.rows, "files", ()))):
+        raise InputError(f"{target}: is a part of the lake, which is not written over; wanted another name", target)
     kept, rows = _kept(target), {}
     asked = _asked(options)
     begun, wrote_s, changed = time.monotonic(), 0.0, False
-    source = dataset.dataset(lake)
     try:
         for device in names(lake):
             table = _rows(source, device)
@@ -213,18 +272,35 @@ def identify_lake(lake: Path, out: Path, **options: Any) -> pa.Table:
     return pa.concat_tables([row for row, _ in rows.values()]) if rows else SCHEMA.empty_table()
 
 
+def _is_within(path: Path, folder: Path) -> bool:
+    """Whether a path is one that holds recordings, or lies below it."""
+    own, other = pathlib.Path(path).resolve(), pathlib.Path(folder).resolve()
+    return own == other or other in own.parents or (own.exists() and other.exists() and own.samefile(other))
+
+
 def _asked(options: dict[str, Any]) -> str:
-    """What an answer rests on beside the rows: the version and the options, of files their bytes."""
+    """What an answer rests on beside the rows: the module as it was built, and the options, of files their bytes."""
 
     def said(name: str, value: Any) -> Any:
-        if name == "effects":
-            return [hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest() for file in several(value)]
+        if name in ("effects", "holdout"):
+            return [_bytes(name, file) for file in several(value)]
         return list(value) if name == "map" and not isinstance(value, (str, dict)) else value
 
     # who is told what is going on changes nothing
     words = {name: said(name, value) for name, value in options.items() if name != "progress" and value is not None}
-    text = json.dumps([_cvg.__version__, words], sort_keys=True, default=repr)
+    # two builds of one version may answer differently
+    text = json.dumps([_cvg.__version__, _bytes("cvg", _cvg.__file__), words], sort_keys=True, default=float)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _bytes(name: str, file: Any) -> str:
+    """A checksum of a file."""
+    if not is_path(file):
+        raise InputError(f"{name}: {type(file).__name__} is no path; what a lake is answered with is kept by its bytes")
+    try:
+        return hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{os.fspath(file)}: cannot be read: {error.strerror}", os.fspath(file)) from None
 
 
 def _sum(table: pa.Table) -> str:
@@ -266,7 +342,7 @@ def _kept(target: str) -> dict[str, tuple[pa.Table, str]]:
 
 def population(rows: pa.Table | Iterable[pa.Table]) -> dict[str, Any]:
     """What the devices say together: the facts of fleet.json, as `cvg fleet` finds them in the same reports."""
-    table = rows if isinstance(rows, pa.Table) else pa.concat_tables(rows)
+    table = rows if isinstance(rows, pa.Table) else pa.concat_tables([SCHEMA.empty_table(), *rows])
     columns = (table[name].to_pylist() for name in ("device", "reason", "report"))
     facts: dict[str, Any] = json.loads(_cvg.population(list(zip(*columns))))
     return facts
