@@ -18,6 +18,11 @@ use super::unknown::{Cells, UnknownColumn};
 /// Makes the recording of a table.
 pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let mut warnings = std::mem::take(&mut table.warnings);
+    for &channel in &table.by_own_name {
+        let column = naming.column(channel).unwrap_or_default();
+        warnings.push(format!("there is no column `{column}`: `{channel}` is taken as it is"));
+    }
+    let naming = &naming.without(&table.by_own_name);
     let readout_unit = convert(&mut table, naming, source, &mut warnings)?;
     if table.rows == 0 && table.truncated.is_none() {
         return Err(ReadError::NoRows { path: source.to_path_buf(), place: table.header });

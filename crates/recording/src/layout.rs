@@ -27,6 +27,8 @@ pub(super) struct Layout {
     pub(super) fields: Vec<Field>,
     /// The channels, in the order of the file.
     pub(super) channels: Vec<Channel>,
+    /// Channels whose mapped column is not there: the one of the channel's own name stands for it, in the channel's unit.
+    pub(super) by_own_name: Vec<Channel>,
     /// The names of the other columns, in the order of the file.
     pub(super) unknown: Vec<String>,
     /// Whether rows may end before the last column.
@@ -36,14 +38,23 @@ pub(super) struct Layout {
 impl Layout {
     /// Understands the names in a header. Nameless columns are unknown columns, and may be many.
     pub(super) fn new<S: AsRef<str>>(header: &[S], naming: &Naming, source: &Path) -> Result<Self, ReadError> {
-        let mut layout =
-            Self { names: vec![], fields: vec![], channels: vec![], unknown: vec![], is_last_optional: false };
+        let mut layout = Self {
+            names: vec![],
+            fields: vec![],
+            channels: vec![],
+            by_own_name: vec![],
+            unknown: vec![],
+            is_last_optional: false,
+        };
         for name in header {
             let name = name.as_ref().trim();
             if let Some(channel) = naming.channel(name) {
                 layout.fields.push(Field::Number(layout.channels.len()));
                 layout.channels.push(channel);
                 layout.names.push(channel.name().to_owned());
+                if naming.is_of_another(channel, name) {
+                    layout.by_own_name.push(channel);
+                }
             } else {
                 layout.fields.push(Field::Text(layout.unknown.len()));
                 layout.unknown.push(name.to_owned());

@@ -107,6 +107,16 @@ impl Naming {
         })
     }
 
+    /// Whether a channel is mapped to another column than this one.
+    pub(super) fn is_of_another(&self, channel: Channel, name: &str) -> bool {
+        self.column(channel).is_some_and(|column| !column.eq_ignore_ascii_case(name.trim()))
+    }
+
+    /// This mapping without what it says of these channels: factors and units are of columns that are not there.
+    pub(super) fn without(&self, channels: &[Channel]) -> Self {
+        Self { entries: self.entries.iter().filter(|e| !channels.contains(&e.channel)).cloned().collect() }
+    }
+
     /// The factor that the mapping states for a channel.
     pub(super) fn factor(&self, channel: Channel) -> Option<f64> {
         self.entries.iter().find(|e| e.channel == channel)?.scale

@@ -46,6 +46,8 @@ pub(super) struct NumberColumn {
 pub(super) struct Table {
     pub(super) names: Vec<String>,
     pub(super) numbers: Vec<NumberColumn>,
+    /// Channels of which the mapping names a column that is not there.
+    pub(super) by_own_name: Vec<Channel>,
     pub(super) unknown: Vec<UnknownColumn>,
     pub(super) rows: usize,
     pub(super) places: Places,
@@ -69,6 +71,7 @@ impl Table {
         Self {
             names: layout.names.clone(),
             numbers: layout.channels.iter().map(number).collect(),
+            by_own_name: layout.by_own_name.clone(),
             unknown: layout.unknown.iter().map(text).collect(),
             rows: 0,
             places,

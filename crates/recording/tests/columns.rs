@@ -132,3 +132,25 @@ fn the_text_of_a_campaign_takes_recordings_from_anywhere() {
     let error = opened(&text.replace("rotation", "waltz")).unwrap_err();
     assert_eq!((error.place(), error.column()), (Some(Place::Line(4)), Some(8)), "{error}");
 }
+
+#[test]
+fn a_factor_a_unit_or_an_integral_is_of_the_column_that_is_mapped_and_of_no_other() {
+    for text in ["t_s=ms*0.001", "t_s=Time (ms)", "theta_deg=integral(Ch3)", "rate_dps=Rate*60"] {
+        let mut naming = Naming::default();
+        naming.add(text).unwrap();
+        let (read, plain) = (made(columns(), &naming).unwrap(), made(columns(), Naming::NONE).unwrap());
+        assert_eq!((&read.t_s, &read.rate_dps), (&plain.t_s, &plain.rate_dps), "{text}");
+        assert_eq!(read.theta_deg, plain.theta_deg, "{text}");
+        let said = |of: &str| read.warnings.iter().any(|warning| warning.contains(of));
+        assert!(said("there is no column `") && said("is taken as it is"), "{text}: {:?}", read.warnings);
+        // and in a file of text
+        let mut csv = Vec::new();
+        plain.write_csv(&mut csv).unwrap();
+        let read = Recording::read_from(csv.as_slice(), &naming, Path::new("file")).unwrap();
+        assert_eq!((read.t_s, read.theta_deg), (plain.t_s, plain.theta_deg), "{text}");
+    }
+    // its own name is a column that is there
+    let mut naming = Naming::default();
+    naming.add("t_s=T_s*0.001").unwrap();
+    assert_eq!(made(columns(), &naming).unwrap().t_s[2], 0.001 * made(columns(), Naming::NONE).unwrap().t_s[2]);
+}
