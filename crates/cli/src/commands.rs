@@ -11,6 +11,7 @@ use cvg_model::effects::EffectId;
 use cvg_simulator::{Scenario, ScenarioError};
 
 use crate::arguments::Arguments;
+use crate::failure::line_and_column;
 use crate::limits::Limits;
 use crate::progress::Progress;
 use crate::report::further::{Number, further};
@@ -35,15 +36,16 @@ pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
 
 /// A scenario's text; `name` is what it is called where something is wrong with it.
 pub(crate) fn scenario_of(text: &str, name: &str) -> Result<Scenario, Failure> {
-    Scenario::parse(text).map_err(|e| Failure::input(format!("{name}: {}", scenario_problem(&e, text))))
+    Scenario::parse(text).map_err(|e| {
+        let at = if let ScenarioError::Unreadable(e) = &e { e.span().map(|span| span.start) } else { None };
+        Failure::within(format!("{name}: {}", scenario_problem(&e, text)), name).at(text, at)
+    })
 }
 
 /// What is wrong with a scenario and where, in one line.
 fn scenario_problem(error: &ScenarioError, text: &str) -> String {
     let ScenarioError::Unreadable(unreadable) = error else { return error.to_string() };
-    let before = unreadable.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-    let line = before.matches('\n').count() + 1;
-    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    let (line, column) = unreadable.span().and_then(|span| line_and_column(text, span.start)).unwrap_or((1, 1));
     let message = unreadable.message().split_whitespace().collect::<Vec<_>>().join(" ");
     format!("line {line}, column {column}: {message}")
 }

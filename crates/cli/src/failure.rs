@@ -33,6 +33,17 @@ impl Failure {
         Self { file, place: error.place(), column: error.column(), ..Self::input(message) }
     }
 
+    /// What is wrong with a file or a text that is called `name`.
+    pub(crate) fn within(message: impl fmt::Display, name: &str) -> Self {
+        Self { file: Some(PathBuf::from(name)), ..Self::input(message) }
+    }
+
+    /// The same failure at a byte of the text.
+    pub(crate) fn at(self, text: &str, byte: Option<usize>) -> Self {
+        let Some((line, column)) = byte.and_then(|byte| line_and_column(text, byte)) else { return self };
+        Self { place: Some(Place::Line(line as u64)), column: Some(column), ..self }
+    }
+
     /// Whether the input was sound, and did not carry an answer.
     #[must_use]
     pub fn is_no_answer(&self) -> bool {
@@ -58,6 +69,12 @@ impl Failure {
     }
 }
 
+/// Line and column of a byte of a text, both from 1.
+pub(crate) fn line_and_column(text: &str, byte: usize) -> Option<(usize, usize)> {
+    let before = text.get(..byte)?;
+    Some((before.matches('\n').count() + 1, before.chars().rev().take_while(|c| *c != '\n').count() + 1))
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
@@ -69,7 +86,8 @@ impl std::error::Error for Failure {}
 impl From<Refusal> for Failure {
     fn from(refusal: Refusal) -> Self {
         match refusal.cause {
-            Cause::BadInput => Self::input(refusal),
+            Cause::BadInput if refusal.place.is_empty() => Self::input(refusal),
+            Cause::BadInput => Self::within(&refusal, &refusal.place),
             Cause::NoAnswer => Self::no_answer(refusal),
         }
     }

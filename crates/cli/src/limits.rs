@@ -40,16 +40,17 @@ impl Limits {
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
         let text = std::fs::read_to_string(path)
-            .map_err(|e| Failure::input(format!("{name}: cannot be read: {e}; wanted {WANTED}")))?;
+            .map_err(|e| Failure::within(format!("{name}: cannot be read: {e}; wanted {WANTED}"), &name.to_string()))?;
         Self::of_text(&text, &name.to_string())
     }
 
     /// The limits that a text says; `name` is what it is called where something is wrong with it.
     pub(crate) fn of_text(text: &str, name: &str) -> Result<Self, Failure> {
-        let bad = |what: String| Failure::input(format!("{name}: {what}; wanted {WANTED}"));
-        let table: Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| bad(e.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
+        let bad = |what: String| Failure::within(format!("{name}: {what}; wanted {WANTED}"), name);
+        let table: Table = text.parse().map_err(|e: toml::de::Error| {
+            let what = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            bad(what).at(text, e.span().map(|span| span.start))
+        })?;
         let mut limits = Self::default();
         limits.add(&table, "").map_err(bad)?;
         if limits.0.is_empty() { Err(bad("there is no limit".into())) } else { Ok(limits) }

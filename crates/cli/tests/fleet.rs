@@ -119,6 +119,43 @@ fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
 }
 
 #[test]
+fn an_answer_that_is_not_whole_or_is_another_is_made_anew_and_one_of_an_earlier_day_is_no_answer() {
+    let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    devices(folder.path());
+    for number in 2..DEVICES {
+        fs::remove_dir_all(folder.path().join(format!("unit-{number:02}"))).unwrap();
+    }
+    assert_eq!(fleet(folder.path(), out.path()).status, 0);
+    let own = |number: usize, name: &str| out.path().join(format!("unit-{number:02}")).join(name);
+    let all = || ["report.json", "calibration.toml", "source.json"].map(|name| fs::read(own(0, name)).ok());
+    let whole = all();
+    assert!(whole.iter().all(Option::is_some));
+    let harm: [(&str, &dyn Fn(&Path)); 5] = [
+        ("calibration.toml", &|file| fs::remove_file(file).unwrap()),
+        ("calibration.toml", &|file| fs::write(file, "device = \"another\"\n").unwrap()),
+        ("report.json", &|file| fs::write(file, fs::read_to_string(file).unwrap() + " ").unwrap()),
+        ("source.json", &|file| fs::remove_file(file).unwrap()),
+        // by another build of the same version
+        ("source.json", &|file| {
+            let mut said: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+            said["program"] = "00000000".into();
+            fs::write(file, format!("{said:#}\n")).unwrap();
+        }),
+    ];
+    for (name, harm) in harm {
+        harm(&own(0, name));
+        assert_eq!(fleet(folder.path(), out.path()).status, 0);
+        assert!(all() == whole, "{name}");
+    }
+    // a device that can no longer be read
+    fs::write(folder.path().join("unit-00/campaign.toml"), "[campaign]\ndevice = 3\n").unwrap();
+    assert_eq!(fleet(folder.path(), out.path()).status, 0);
+    assert_eq!(facts(out.path())["refused"], 1);
+    assert!(all().iter().all(Option::is_none), "what was answered is of another day");
+    assert!(own(1, "report.json").is_file());
+}
+
+#[test]
 fn a_fleet_without_an_answer_and_a_folder_without_a_campaign_say_so() {
     let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
     let empty = fleet(folder.path(), out.path());
@@ -241,6 +278,10 @@ fn a_lake_is_answered_as_the_campaigns_in_it_are_and_goes_on_where_it_was_broken
     }
     let results = Lake::open(&of_lake.path().join("fleet.parquet")).unwrap().unwrap();
     assert_eq!(results.devices().collect::<Vec<_>>(), ["unit-00", "unit-01", "unit-02"]);
+
+    // results among the rows would be rows
+    let within = fleet(lake.path(), lake.path());
+    assert!(within.status == 2 && within.stderr.contains("is the lake"), "{}", within.stderr);
 
     // a row of the first device changes
     let written = |number: usize| fs::metadata(results_of(of_lake.path(), number)).unwrap().modified().unwrap();

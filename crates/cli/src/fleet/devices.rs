@@ -10,15 +10,12 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::lake::{self, Member};
-use super::{PRIOR, SUMMARIES};
+use super::{PRIOR, SUMMARIES, kept};
 use crate::commands::{RESULTS, Told};
 use crate::input::{Wanted, campaign, explained, files};
 use crate::limits::Limits;
 use crate::population::Device;
 use crate::{Failure, output};
-
-/// What the folder of a device of a lake has of the rows that its answer rests on.
-const SOURCE: &str = "source.json";
 
 /// Where devices are.
 pub(super) enum Source {
@@ -92,9 +89,9 @@ pub(super) fn answered(sources: Vec<Source>, out: &Path, limits: Option<&Limits>
         lake::each(lake, |members| {
             let placed: Vec<(String, Member)> = members.into_iter().map(|m| (folders.of_name(&m.name), m)).collect();
             let of_member = |(folder, member): (String, Member)| {
-                let (name, source) = (member.name.clone(), member.source(lake.path()));
+                let (name, rows) = (member.name.clone(), member.rows(lake.path()));
                 let place = Place { folder, name, path: lake.path().to_path_buf(), out };
-                device(member.campaign(), Some(&source), place, limits)
+                device(member.campaign(), Some(&rows), place, limits)
             };
             all.extend(placed.into_par_iter().map(of_member).collect::<Result<Vec<_>, _>>()?);
             Ok(())
@@ -147,21 +144,24 @@ struct Place<'a> {
     out: &'a Path,
 }
 
-/// Identifies one device, or takes the answer that is there; `source` says which rows of a lake it is.
+/// Identifies one device, or takes the answer that is there; `rows` says which rows of a lake it is.
 fn device(
     opened: Result<Campaign, Failure>,
-    source: Option<&str>,
+    rows: Option<&Value>,
     place: Place<'_>,
     limits: Option<&Limits>,
 ) -> Result<Device, Failure> {
     let own = place.out.join(&place.folder);
     let report = match opened {
-        Ok(opened) => match kept(&own, &opened, source) {
+        Ok(opened) => match kept::answer(&own, &opened, rows) {
             Some(report) => report,
-            None => identified(opened, &own, source)?,
+            None => identified(opened, &own, rows)?,
         },
-        // a device that cannot be read is a row as well
-        Err(failure) => json!({"device": place.name, "status": "refused", "reason": failure.message}),
+        // a device that cannot be read is a row as well, and has no answer of an earlier day
+        Err(failure) => {
+            take_away(&own, std::slice::from_ref(&place.path))?;
+            json!({"device": place.name, "status": "refused", "reason": failure.message})
+        }
     };
     let name = report["device"].as_str().unwrap_or_default().to_owned();
     let outside = match limits {
@@ -172,19 +172,8 @@ fn device(
     Ok(Device::new(place.folder, place.path, report, outside))
 }
 
-/// The report that is there, where it rests on the same bytes and this very program.
-fn kept(own: &Path, campaign: &Campaign, source: Option<&str>) -> Option<Value> {
-    let [file, ..] = RESULTS;
-    let text = std::fs::read_to_string(own.join(file)).ok()?;
-    let report: Value = serde_json::from_str(&text).ok()?;
-    let inputs = serde_json::to_value(cvg_calibration::report::inputs(campaign)).ok()?;
-    let tool = serde_json::to_value(cvg_calibration::report::Tool::default()).ok()?;
-    let same_rows = std::fs::read_to_string(own.join(SOURCE)).ok().as_deref() == source;
-    (report["inputs"] == inputs && report["tool"] == tool && same_rows).then_some(report)
-}
-
 /// Identifies a campaign, and writes what `cvg identify` writes of it but for the page.
-fn identified(opened: Campaign, own: &Path, source: Option<&str>) -> Result<Value, Failure> {
+fn identified(opened: Campaign, own: &Path, rows: Option<&Value>) -> Result<Value, Failure> {
     let inputs = crate::input::sources(&opened);
     let [report, _, calibration] = RESULTS;
     let about = About::campaign(&opened);
@@ -194,14 +183,26 @@ fn identified(opened: Campaign, own: &Path, source: Option<&str>) -> Result<Valu
     };
     let mut set = output::Set::begin(own, &inputs)?;
     set.add(report, text.as_bytes())?;
-    for (name, text) in [(calibration, undone.as_deref()), (SOURCE, source)] {
-        match text {
-            Some(text) => set.add(name, text.as_bytes())?,
-            None => set.take_away(&[name]),
-        }
+    set.add(kept::SOURCE, kept::source(rows, &text, undone.as_deref()).as_bytes())?;
+    match &undone {
+        Some(undone) => set.add(calibration, undone.as_bytes())?,
+        None => set.take_away(&[calibration]),
     }
     set.commit()?;
     serde_json::from_str(&text).map_err(Failure::input)
+}
+
+/// Removes an answer that is there.
+fn take_away(own: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    let [report, _, calibration] = RESULTS;
+    let files = [report, calibration, kept::SOURCE];
+    // what `cvg fleet` has not written is not its to remove
+    if !own.join(kept::SOURCE).is_file() {
+        return Ok(());
+    }
+    let mut set = output::Set::begin(own, inputs)?;
+    set.take_away(&files);
+    set.commit()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use cvg_calibration::recording::{Campaign, Cells, Lake, Values};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::Failure;
 use crate::service::{self, Columns, Settings};
@@ -37,22 +37,19 @@ pub(super) fn each(lake: &Lake, mut take: impl FnMut(Vec<Member>) -> Result<(), 
 }
 
 impl Member {
-    /// Which rows an answer rests on, as text: a checksum (CRC-32) of names and values.
-    pub(super) fn source(&self, lake: &Path) -> String {
+    /// Which rows an answer rests on: a checksum (CRC-32) of names, types and values.
+    pub(super) fn rows(&self, lake: &Path) -> Value {
         let mut sum = crc32fast::Hasher::new();
         for (name, values) in &self.columns {
-            sum.update(name.as_bytes());
+            add(&mut sum, name);
+            sum.update(&(values.len() as u64).to_le_bytes());
             match values {
                 Values::Numbers(numbers) => numbers.iter().for_each(|v| sum.update(&v.to_bits().to_le_bytes())),
-                Values::Texts(cells) => cells.iter().for_each(|cell| {
-                    sum.update(&(cell.len() as u64).to_le_bytes());
-                    sum.update(cell.as_bytes());
-                }),
-                Values::Unreadable { why, .. } => sum.update(why.as_bytes()),
+                Values::Texts(cells) => cells.iter().for_each(|cell| add(&mut sum, cell)),
+                Values::Unreadable { why, .. } => add(&mut sum, why),
             }
         }
-        let crc32 = format!("{:08x}", sum.finalize());
-        format!("{:#}\n", json!({"lake": lake.display().to_string(), "device": self.name, "crc32": crc32}))
+        json!({"lake": lake.display().to_string(), "device": self.name, "crc32": format!("{:08x}", sum.finalize())})
     }
 
     /// The campaign of the device.
@@ -102,6 +99,12 @@ impl Member {
         }
         service::campaign_of_text(&text, runs.into_iter().collect(), &Settings::default())
     }
+}
+
+/// Adds a text to a checksum, with its length: where it ends counts as well.
+fn add(sum: &mut crc32fast::Hasher, text: &str) {
+    sum.update(&(text.len() as u64).to_le_bytes());
+    sum.update(text.as_bytes());
 }
 
 /// A line of a campaign file for a column that says something.

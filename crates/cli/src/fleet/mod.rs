@@ -6,6 +6,7 @@
 
 mod devices;
 mod facts;
+mod kept;
 mod lake;
 mod table;
 
@@ -39,6 +40,10 @@ pub(crate) fn fleet(names: &[PathBuf], out: &Path, asked: &Asked<'_>) -> Result<
     output::check_folder(out)?;
     let sources = devices::sources(names)?;
     let inputs: Vec<PathBuf> = sources.iter().map(|source| source.path().to_path_buf()).collect();
+    if let Some(lake) = inputs.iter().find(|input| input.is_dir() && is_same(input, out)) {
+        let what = "is the lake, of which fleet.parquet would be a part; wanted another folder for the results";
+        return Err(Failure::input(format!("{}: {what}", lake.display())));
+    }
     let [table, facts, page, results] = SUMMARIES;
     output::check_folder_for(out, &[table, facts, page, results, PRIOR], &inputs)?;
     let progress = Progress::begin();
@@ -55,6 +60,11 @@ pub(crate) fn fleet(names: &[PathBuf], out: &Path, asked: &Asked<'_>) -> Result<
         return Err(Failure::no_answer(format!("{outside} of {} devices are outside their limits", rows.len())));
     }
     Ok(())
+}
+
+/// Whether two names are of one folder that is there.
+fn is_same(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
 /// The facts of a fleet, and the same in words.
