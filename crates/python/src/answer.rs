@@ -128,7 +128,10 @@ fn answered(
         say("reading");
         let limits = asked.limits()?;
         let effects = service::written_effects(&asked.effects)?;
-        let answered = service::answer(open()?, effects, say)?;
+        let campaign = open()?;
+        say("identifying");
+        let answered = service::answer(campaign, effects, say)?;
+        say("reporting");
         let parameters = answered.parameters()?;
         let verdicts = limits.map_or(Ok(Vec::new()), |limits| answered.judged(&limits))?;
         Ok((answered, parameters, verdicts))

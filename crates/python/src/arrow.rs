@@ -17,6 +17,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
 
+use crate::errors::bad;
+
 /// The name that the interface gives its capsules.
 const STREAM: &CStr = c"arrow_array_stream";
 /// How pandas names an index that it hands out as a column.
@@ -24,12 +26,12 @@ const INDEX: &str = "__index_level_";
 
 /// Columns of what `__arrow_c_stream__` gives.
 pub(crate) fn imported(stream: Bound<'_, PyAny>) -> PyResult<Columns> {
+    let py = stream.py();
     let capsule = stream.cast_into::<PyCapsule>()?;
     let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
     // SAFETY: a capsule of this name holds a valid stream, which is moved out of it: what is left is marked as released
     let stream = unsafe { FFI_ArrowArrayStream::from_raw(pointer.as_ptr()) };
-    let broken =
-        |e: arrow_schema::ArrowError| PyValueError::new_err(format!("the stream of Arrow data breaks off: {e}"));
+    let broken = |e: arrow_schema::ArrowError| bad(py, format!("the stream of Arrow data cannot be read: {e}"));
     let reader = RecordBatchStreamReader::try_new(stream).map_err(broken)?;
     let schema = reader.schema();
     let mut columns: Vec<(String, Option<Values>)> = schema.fields().iter().map(|f| (f.name().clone(), None)).collect();
@@ -176,12 +178,20 @@ impl Table {
         Ok(Self { batch: batch.map_err(|e| PyValueError::new_err(e.to_string()))? })
     }
 
-    /// The columns of a recording in the order in which it is written.
-    pub(crate) fn recording(recording: &Recording) -> PyResult<Self> {
+    /// The columns of a recording in the order in which it is written; those of the names `numbers` came as numbers, and are.
+    pub(crate) fn recording(recording: &Recording, numbers: &[String]) -> PyResult<Self> {
+        let as_they_came = |name: &str, cells: &Cells| {
+            if numbers.iter().any(|n| n == name) {
+                // a recording keeps what is no channel as text, with all digits
+                Values::Numbers(cells.iter().map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+            } else {
+                Values::Texts(cells.clone())
+            }
+        };
         let of = |name: &str| {
-            let numbers = Channel::of(name).and_then(|c| recording.channel(c)).map(|v| Values::Numbers(v.to_vec()));
-            let texts = || recording.unknown.iter().find(|u| u.name == name).map(|u| Values::Texts(u.cells.clone()));
-            numbers.or_else(texts).map(|values| (name.to_owned(), values))
+            let channel = Channel::of(name).and_then(|c| recording.channel(c)).map(|v| Values::Numbers(v.to_vec()));
+            let other = || recording.unknown.iter().find(|u| u.name == name).map(|u| as_they_came(name, &u.cells));
+            channel.or_else(other).map(|values| (name.to_owned(), values))
         };
         Self::of(recording.column_names().filter_map(of).collect())
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use cvg_calibration::calibration;
+use cvg_calibration::recording::Values;
 use cvg_cli::service;
 use pyo3::prelude::*;
 
@@ -62,6 +63,8 @@ impl Calibration {
         map: Vec<String>,
     ) -> PyResult<(Table, Vec<String>)> {
         let (columns, naming, calibration) = (columns(data)?, naming(py, &map)?, self.calibration.clone());
+        let is_number = |(_, values): &&(String, Values)| matches!(values, Values::Numbers(_));
+        let numbers: Vec<String> = columns.iter().filter(is_number).map(|(name, _)| name.trim().to_owned()).collect();
         let done = aside(py, None, move |_| {
             let recording = service::recording(columns, &naming, &name)?;
             let mut warnings = recording.warnings.clone();
@@ -69,6 +72,6 @@ impl Calibration {
             cvg_calibration::compensate(&calibration, &recording).map(|out| (out, warnings)).map_err(Into::into)
         })?;
         let (compensated, warnings) = done.map_err(|e: cvg_cli::Failure| failed(py, &e))?;
-        Ok((Table::recording(&compensated)?, warnings))
+        Ok((Table::recording(&compensated, &numbers)?, warnings))
     }
 }

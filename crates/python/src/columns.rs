@@ -33,6 +33,12 @@ pub(crate) fn columns(object: &Bound<'_, PyAny>) -> PyResult<Columns> {
         let items = mapping.items()?;
         return items.iter().map(|item| named(&item.get_item(0)?, &item.get_item(1)?)).collect();
     }
+    // an array of records: its fields are the columns
+    if let Ok(names) = object.getattr("dtype").and_then(|dtype| dtype.getattr("names"))
+        && !names.is_none()
+    {
+        return names.try_iter()?.map(|name| name.and_then(|n| named(&n, &object.get_item(&n)?))).collect();
+    }
     // a frame that is yet to be worked out has no rows
     if object.hasattr("__len__")? && object.hasattr("columns")? {
         let names = object.getattr("columns")?;

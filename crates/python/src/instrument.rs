@@ -1,12 +1,14 @@
 //! The electronics as firmware runs them, over arrays of samples.
 
 use cvg_instrument::{Instrument as Electronics, Settings, State};
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 
 use crate::errors::bad;
 
 type Samples<'py> = Bound<'py, PyArray1<f64>>;
+/// What numpy makes an array of one dimension of.
+type Given<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 
 /// The electronics of a whole-angle gyroscope: converter values in, converter values out, in f64.
 #[pyclass(module = "cvg")]
@@ -26,17 +28,19 @@ impl Instrument {
         py: Python<'_>,
         carrier_hz: Option<f64>,
         sample_hz: Option<f64>,
-        window: Option<u16>,
+        window: Option<i64>,
         amplitude_v: Option<f64>,
         drive_per_s_v: Option<f64>,
         readout_delay_s: Option<f64>,
         drive_delay_s: Option<f64>,
     ) -> PyResult<Self> {
         let usual = Settings::default();
+        let window = window.map_or(Ok(usual.window), u16::try_from);
+        let window = window.map_err(|_| bad(py, format!("window: wanted a number of samples up to {}", u16::MAX)))?;
         let settings = Settings {
             carrier_hz: carrier_hz.unwrap_or(usual.carrier_hz),
             sample_hz: sample_hz.unwrap_or(usual.sample_hz),
-            window: window.unwrap_or(usual.window),
+            window,
             amplitude_v: amplitude_v.unwrap_or(usual.amplitude_v),
             drive_per_s_v: drive_per_s_v.unwrap_or(usual.drive_per_s_v),
             readout_delay_s: readout_delay_s.unwrap_or(usual.readout_delay_s),
@@ -51,8 +55,8 @@ impl Instrument {
     fn step<'py>(
         &mut self,
         py: Python<'py>,
-        adc_x: PyReadonlyArray1<'py, f64>,
-        adc_y: PyReadonlyArray1<'py, f64>,
+        adc_x: Given<'py>,
+        adc_y: Given<'py>,
     ) -> PyResult<(Samples<'py>, Samples<'py>, Samples<'py>)> {
         let (x, y) = (adc_x.as_array().to_vec(), adc_y.as_array().to_vec());
         if x.len() != y.len() {

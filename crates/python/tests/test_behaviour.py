@@ -46,6 +46,30 @@ def test_an_error_says_file_line_and_column(tmp_path):
     assert (raised.value.file, raised.value.line) == (str(campaign), 2)
 
 
+def test_an_error_says_in_which_of_the_files_that_were_given(folder, tmp_path):
+    table = folder / "rot+500.csv"
+    broken = tmp_path / "broken.toml"
+    broken.write_text("a = 1\nb = = 2\n")
+    binary = tmp_path / "binary"
+    binary.write_bytes(b"\xff\xfe\x00")
+    nowhere = tmp_path / "nowhere.toml"
+    for call, file, line in (
+        (lambda: cvg.identify(table, limits=broken), broken, 2),
+        (lambda: cvg.identify(table, limits=nowhere), nowhere, None),
+        (lambda: cvg.identify(table, effects=nowhere), nowhere, None),
+        (lambda: cvg.identify(table, effects=broken), broken, None),
+        (lambda: cvg.Calibration.read(nowhere), nowhere, None),
+        (lambda: cvg.Calibration.read(broken), broken, None),
+        (lambda: cvg.simulate(broken), broken, 2),
+        (lambda: cvg.simulate(binary), binary, None),
+        (lambda: cvg.simulate(nowhere), nowhere, None),
+    ):
+        with pytest.raises(cvg.InputError) as raised:
+            call()
+        assert (raised.value.file, raised.value.line) == (str(file), line), str(raised.value)
+    assert raised.value.column is None
+
+
 def test_an_error_of_a_frame_says_its_row():
     back = {"t_s": [0.0, 0.1, 0.2, 0.05], "rate_dps": [10.0] * 4, "theta_deg": [0.0, 1.0, 2.0, 3.0]}
     with pytest.raises(cvg.InputError) as raised:
@@ -58,6 +82,63 @@ def test_an_error_of_a_frame_says_its_row():
             cvg.identify(wrong)
     with pytest.raises(cvg.InputError, match="one dimension"):
         cvg.identify(back | {"t_s": numpy.zeros((4, 2))})
+
+
+def test_a_call_that_cannot_be_meant_says_what_is_wanted(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    wide = polars.from_pandas(table).with_columns(polars.col("rate_dps").cast(polars.Int128))
+    for call, what in (
+        (lambda: cvg.identify(table, map={"t_s": ("Time", 0.001)}), "map: `t_s` is mapped to"),
+        (lambda: cvg.identify(table, campaign={"carrier_hz": [1.0]}), "no value of a campaign|carrier_hz"),
+        (lambda: cvg.identify(table, campaign={"device": object()}), "is no value of a campaign"),
+        (lambda: cvg.identify(wide), "the stream of Arrow data cannot be read"),
+        (lambda: cvg.inspect(None), "nothing to inspect"),
+        (lambda: cvg.inspect([table, "rot.csv"]), "cannot be mixed"),
+        (lambda: cvg.Instrument(window=-1), "window: wanted"),
+        (lambda: cvg.Instrument(window=1 << 16), "window: wanted"),
+    ):
+        with pytest.raises(cvg.InputError, match=what):
+            call()
+    with pytest.raises(TypeError, match="bytes is no scenario"):
+        cvg.simulate(b"scenario.toml")
+
+
+def test_numbers_of_numpy_are_numbers_of_a_campaign(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+
+    def answered(carrier, settle):
+        return cvg.identify([cvg.Run(table, "a", settle_s=settle)], campaign={"carrier_hz": carrier}).to_json()
+
+    expected = answered(15200.0, 1.5)
+    for number in (numpy.float32, numpy.float64):
+        assert answered(number(15200.0), number(1.5)) == expected
+    assert answered(numpy.int64(15200), decimal.Decimal("1.5")) == expected
+
+
+def test_a_mapping_to_a_column_that_is_not_there_scales_no_other(folder):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    report = cvg.identify(table, map={"t_s": "Time*0.001", "xc_v": "A*3"})
+    assert [p.value for p in report.parameters] == [p.value for p in cvg.identify(table).parameters]
+    assert sum("taken as it is" in warning for warning in report.warnings) == 2
+
+
+def test_a_compensated_frame_has_the_index_and_the_numbers_that_it_came_with(folder, report):
+    table = pandas.read_csv(folder / "rot+500.csv")
+    rows = len(table)
+    extra = table.assign(load=numpy.linspace(-1.0, 1e300, rows), count=numpy.arange(rows), note="x")
+    for index in (pandas.RangeIndex(5, rows + 5), pandas.date_range("2026-03-01", periods=rows, freq="10ms"), numpy.arange(rows)[::-1]):
+        frame = extra.set_axis(index, axis=0)
+        with pytest.warns(UserWarning, match="unknown columns"):
+            clean = report.calibration.compensate(frame)
+        assert clean.index.equals(frame.index)
+        for name in ("load", "count"):
+            numpy.testing.assert_array_equal(clean[name], frame[name])
+        assert list(clean["note"]) == ["x"] * rows
+    # of which rows were left out, nobody can say what they are called
+    gaps = table.astype(float)
+    gaps.loc[10:12, "xc_v"] = numpy.nan
+    with pytest.warns(UserWarning, match="3 of 1000 rows dropped"):
+        assert len(report.calibration.compensate(gaps)) == rows - 3
 
 
 def test_sound_data_without_an_answer_says_so_with_its_report(folder, cli):
@@ -116,6 +197,14 @@ def frames(table: pandas.DataFrame):
     yield "backwards", {name: table[name].to_numpy()[::-1].copy()[::-1] for name in table}
     yield "series of polars", {name: polars.from_pandas(table)[name] for name in table}
     yield "an index of times", table.set_index("t_s")
+    yield "views of text", pyarrow.table({name: pyarrow.array(table[name].astype(str)).cast(pyarrow.string_view()) for name in table})
+    yield "records", table.to_records(index=False)
+    yield "columns of a block", {name: table.to_numpy()[:, at] for at, name in enumerate(table)}
+    frozen = {name: table[name].to_numpy().copy() for name in table}
+    for values in frozen.values():
+        values.setflags(write=False)
+    yield "not to be written", frozen
+    yield "a stream", arrow.to_reader()
 
 
 def test_the_same_recording_in_any_form_has_the_same_report(folder):
@@ -234,7 +323,7 @@ def test_the_interpreter_is_free_meanwhile_and_progress_is_told(folder):
     lasted = time.monotonic() - began
     done.set()
     other.join()
-    assert "reading" in told and "fitting the declared model" in told
+    assert told[:2] == ["reading", "identifying"] and told[-1] == "reporting" and "fitting the declared model" in told
     # held for the whole time, the other thread had not run at all
     assert len(ticks) > 0.1 * lasted / 0.005, (len(ticks), lasted)
 
@@ -283,6 +372,14 @@ def test_the_instrument_steps_over_arrays_and_goes_on_where_it_was():
     assert numpy.isfinite(once[0]).all() and numpy.abs(once[0]).max() <= 10.0
     total = cvg.Instrument().step(numpy.array([numpy.nan, numpy.inf]), numpy.array([0.0, -numpy.inf]))
     assert all(numpy.isfinite(out).all() for out in total)
+    # whatever numpy makes an array of
+    narrow = x[:1000].astype("f4")
+    expected = cvg.Instrument().step(narrow.astype(float), y[:1000])
+    for form in (narrow, list(map(float, narrow)), pandas.Series(narrow), narrow.astype(">f4"), numpy.repeat(narrow, 2)[::2]):
+        for got, wanted in zip(cvg.Instrument().step(form, y[:1000]), expected):
+            numpy.testing.assert_array_equal(got, wanted)
+    with pytest.raises(TypeError):
+        cvg.Instrument().step(numpy.zeros((2, 2)), numpy.zeros((2, 2)))
     with pytest.raises(cvg.InputError):
         cvg.Instrument(sample_hz=-1.0)
     with pytest.raises(cvg.InputError, match="as many"):

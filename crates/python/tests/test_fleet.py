@@ -240,6 +240,16 @@ def test_a_lake_is_not_written_over_and_answers_are_no_part_of_it(lake, tmp_path
     assert os.listdir(folder) == ["lake.parquet"]
 
 
+def test_a_lake_in_zstandard_is_answered_here_and_refused_by_the_command_with_a_way_out(lake, cli, tmp_path):
+    one = lake.filter(pc.equal(lake["device"], "unit-00"))
+    path = tmp_path / "lake.parquet"
+    for codec, status in (("zstd", 2), ("snappy", 0)):
+        pyarrow.parquet.write_table(one, path, compression=codec)
+        assert fleet.identify_lake(path, tmp_path / "answers.parquet")["status"].to_pylist() == ["answered"]
+        said = cli.said("fleet", path, "--out", tmp_path / codec, status=status).stderr.decode()
+        assert ("is compressed with ZSTD" in said and "wanted no compression, SNAPPY" in said) == (status == 2), said
+
+
 def test_a_table_of_any_library_is_one(lake):
     import polars
 

@@ -107,7 +107,11 @@ def identify(
 def inspect(x: Any, *, map: Map = None, name: str = "recording") -> list[dict[str, Any]]:
     """What is in recordings, and what is wrong with them; `x` is as in `identify`."""
     given = several(x)
-    if all(is_path(item) for item in given):
+    if not given:
+        raise InputError("there is nothing to inspect; wanted recordings")
+    if any(is_path(item) for item in given) and not all(is_path(item) for item in given):
+        raise InputError("recordings on disk and in memory cannot be mixed; wanted one or the other")
+    if is_path(given[0]):
         said = _cvg.inspect_files(paths(given), entries(map))
     else:
         every = runs([Run(given[0], name)] if len(given) == 1 and not isinstance(given[0], Run) else given)
@@ -124,6 +128,8 @@ def effects() -> list[dict[str, Any]]:
 
 def simulate(scenario: Path) -> Simulation:
     """Simulates a scenario, given as a path or as its text (TOML)."""
+    if not is_path(scenario):
+        raise TypeError(f"{type(scenario).__name__} is no scenario; wanted a path, or its text")
     said = os.fspath(scenario)
     if "\n" in said:
         return _cvg.simulate(said, "scenario")
@@ -132,3 +138,5 @@ def simulate(scenario: Path) -> Simulation:
             return _cvg.simulate(file.read(), said)
     except OSError as error:
         raise InputError(f"{said}: cannot be read: {error.strerror}", said) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{said}: is no text in UTF-8; wanted a scenario", said) from None

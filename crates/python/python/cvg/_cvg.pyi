@@ -3,7 +3,7 @@ from collections.abc import Callable
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _Floats = NDArray[np.float64]
 _Path = str | os.PathLike[str]
@@ -85,7 +85,7 @@ class Instrument:
     def fault(self) -> str | None: ...
     def __copy__(self) -> Instrument: ...
     def __deepcopy__(self, memo: object) -> Instrument: ...
-    def step(self, adc_x: _Floats, adc_y: _Floats) -> tuple[_Floats, _Floats, _Floats]: ...
+    def step(self, adc_x: ArrayLike, adc_y: ArrayLike) -> tuple[_Floats, _Floats, _Floats]: ...
 
 def identify_files(
     files: list[str],

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any, SupportsFloat, SupportsIndex, Union
 
 from ._errors import InputError
 
@@ -61,6 +61,9 @@ def entries(columns: Map) -> list[str]:
     if columns is None:
         return []
     if isinstance(columns, Mapping):
+        for channel, column in columns.items():
+            if not isinstance(column, str):
+                raise InputError(f"map: `{channel}` is mapped to {column!r}; wanted a column's name, as in 'Time*0.001'")
         return [f"{channel}={column}" for channel, column in columns.items()]
     if isinstance(columns, str):
         return [columns]
@@ -84,8 +87,7 @@ def _inline(ends: Mapping[str, float]) -> str:
 
 
 def _number(value: object) -> str:
-    # numpy's numbers are numbers as well
-    if isinstance(value, (str, bool)) or not hasattr(value, "__float__"):
+    if isinstance(value, bool) or not isinstance(value, SupportsFloat):
         return _toml(str(value))
     return repr(float(value))
 
@@ -102,8 +104,18 @@ def runs(x: Sequence[object], first: int = 1) -> list[Run]:
 
 
 def _toml(value: object) -> str:
-    # strings, numbers and truth values are written alike in JSON and TOML
-    return json.dumps(value, ensure_ascii=False)
+    # numpy's numbers are numbers as well
+    if not isinstance(value, bool) and isinstance(value, SupportsIndex):
+        return repr(value.__index__())
+    if not isinstance(value, bool) and isinstance(value, SupportsFloat):
+        return repr(float(value))
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    # strings and truth values are written alike in JSON and TOML
+    try:
+        return json.dumps(value, ensure_ascii=False)
+    except TypeError:
+        raise InputError(f"campaign: {value!r} is no value of a campaign; wanted a text or a number") from None
 
 
 def text(campaign: Mapping[str, object], recordings: Sequence[Run]) -> str:
@@ -126,13 +138,15 @@ def text(campaign: Mapping[str, object], recordings: Sequence[Run]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def like(table: Any, pattern: object) -> Any:
-    """A table as what `pattern` is: of pandas, polars or pyarrow, or a dict of arrays."""
+def like(table: Any, pattern: Any) -> Any:
+    """A table as what `pattern` is: of pandas, with its index, polars or pyarrow, or a dict of arrays."""
     library = type(pattern).__module__.split(".")[0]
     if library == "pandas":
         import pandas
 
-        return pandas.DataFrame(table.to_dict())
+        frame = pandas.DataFrame(table.to_dict())
+        # where rows were left out, nobody says which
+        return frame.set_axis(pattern.index, axis=0) if len(frame) == len(pattern) else frame
     if library == "polars":
         import polars
 
