@@ -109,8 +109,8 @@ impl Exact {
     /// it is on this path.
     ///
     /// # Panics
-    /// Where `by` is not one real or angle that stands for itself, and where this path has no inside: two values were
-    /// found equal.
+    /// Where `by` is not one real or angle that stands for itself, and where this path may have an edge or no inside: two
+    /// values that were compared may be equal on it.
     #[must_use]
     pub fn derivative(self, by: Self) -> Self {
         let by_value = by.fraction();
@@ -123,7 +123,7 @@ impl Exact {
                 matches!(w.indeterminates[*v].kind, Kind::Real | Kind::Nonzero | Kind::Positive | Kind::Angle { .. })
             };
             let variable = variable.filter(free)?;
-            assert!(!w.is_thin(), "refused: a derivative where two values were found equal");
+            assert!(w.is_open(), "refused: a derivative where two values may be equal that were compared");
             let value = self.value_in(w);
             let (slope, rests) = w.derivative(&value.fraction, variable);
             Some((slope, rests.max(value.rests)))

@@ -323,9 +323,9 @@ impl World {
         })
     }
 
-    /// Whether a comparison on this path found two values equal: then it is a path without an inside.
-    pub(crate) fn is_thin(&self) -> bool {
-        self.taken.iter().any(|choice| choice.orders == Orders::EQUAL)
+    /// Whether every point of this path has others of it all around: its comparisons found strict inequalities alone.
+    pub(crate) fn is_open(&self) -> bool {
+        self.taken.iter().all(|choice| choice.orders.and(Orders::EQUAL) == Orders::NONE)
     }
 
     /// The comparisons of this path, as text.

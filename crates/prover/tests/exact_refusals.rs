@@ -215,7 +215,7 @@ fn a_derivative_by_what_depends_on_others_is_refused() {
 }
 
 #[test]
-#[should_panic(expected = "two values were found equal")]
+#[should_panic(expected = "two values may be equal that were compared")]
 fn a_derivative_on_a_path_without_an_inside_is_refused() {
     let ended = prove(|proof| {
         let x = Exact::real("x");
@@ -224,6 +224,58 @@ fn a_derivative_on_a_path_without_an_inside_is_refused() {
         proof.equal("slope", value.derivative(x), value.derivative(x))
     });
     drop(ended);
+}
+
+/// The claim of `slope` at `value`, of which this path says that it is the function.
+fn slope_on_its_path(value: Exact, by: Exact, proof: &mut Proof) -> Result<(), Refusal> {
+    proof.may_be_empty("nobody looked");
+    proof.equal("slope", value.derivative(by), value.derivative(by))
+}
+
+#[test]
+#[should_panic(expected = "two values may be equal that were compared")]
+fn a_derivative_where_three_values_are_each_no_less_than_the_next_is_refused() {
+    // y, written as x where the two and z are equal: no comparison finds two of them equal
+    let ended = prove(|proof| {
+        let [x, y, z] = ["x", "y", "z"].map(Exact::real);
+        let value = if x <= y && y <= z && z <= x { x } else { y };
+        slope_on_its_path(value, x, proof)
+    });
+    drop(ended);
+}
+
+#[test]
+#[should_panic(expected = "two values may be equal that were compared")]
+fn a_derivative_where_a_square_is_not_above_zero_is_refused() {
+    let ended = prove(|proof| {
+        let [x, y] = ["x", "y"].map(Exact::real);
+        let value = if (x - y) * (x - y) <= Exact::zero() { x } else { y };
+        slope_on_its_path(value, x, proof)
+    });
+    drop(ended);
+}
+
+#[test]
+#[should_panic(expected = "two values may be equal that were compared")]
+fn a_derivative_at_a_corner_is_refused() {
+    let ended = prove(|proof| {
+        let x = Exact::real("x");
+        slope_on_its_path(if x < Exact::zero() { -x } else { x }, x, proof)
+    });
+    drop(ended);
+}
+
+#[test]
+fn a_derivative_between_strict_bounds_is_one() {
+    proved(|proof| {
+        let x = Exact::real("x");
+        if x > Exact::zero() {
+            proof.equal("slope", (x * x).derivative(x), Exact::two() * x)
+        } else {
+            proof.outside("not above zero");
+            Ok(())
+        }
+    });
 }
 
 // Paths.

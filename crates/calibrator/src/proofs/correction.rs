@@ -30,6 +30,7 @@ fn what_is_in_force_is_bounded<T: Float + Arbitrary>(share: f64) {
     if let Some(c) = made {
         kani::cover!(c.known.iter().any(|v| *v < T::zero()), "a value below none");
         for p in Parameter::ALL {
+            kani::cover!(true, "every parameter");
             assert!(get(&c.known, p).magnitude() <= p.expected::<T>() * T::from_f64(FARTHEST * share));
         }
         let near = |z: Complex<T>, re: T, reach: f64| {

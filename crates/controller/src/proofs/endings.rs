@@ -81,32 +81,32 @@ fn nothing_is_walked_around<T: Float + Arbitrary>(slack: u32) {
     kani::cover!(state.mode == Mode::Lock && state.coasts > before.coasts, "an interruption");
     kani::cover!(state.mode == Mode::WholeAngle && state.bad > before.bad, "out of bounds");
     kani::cover!(state.mode == Mode::Hold && state.bad == 0 && before.bad > 0, "forgotten");
-    if before.mode == Mode::Fault || state.mode == Mode::Fault {
-        return;
-    }
-    if !calm(&supervisor, &state, &o, supervisor.endure) {
-        kani::cover!(true, "not well for the time that is endured");
-        assert!(state.bad >= before.bad && state.clipped == before.clipped + u32::from(o.clipped) + slack);
-    }
-    if !calm(&supervisor, &state, &o, supervisor.forget) {
-        kani::cover!(true, "not well for the time to forget");
-        assert!(state.coasts >= before.coasts && state.starts == before.starts);
-    }
-    if in_operation(before.mode) && starting(state.mode) {
-        kani::cover!(true, "out of operation");
-        // by the wish for another mode, or counted
-        assert!(state.coasts == before.coasts + 1 || (state.mode == Mode::SpinUp && state.trying == 0));
-        assert!(state.coasts <= MOST_COASTS || state.mode == Mode::SpinUp);
-    }
-    let high = o.valid && o.pendulum.e > supervisor.high_2 && !o.jumped;
-    if high && in_operation(before.mode) && in_operation(state.mode) && before.mode == state.mode {
-        kani::cover!(true, "too high");
-        assert!(state.bad == before.bad + 1 && state.bad < supervisor.endure);
-    }
-    if matches!(state.mode, Mode::WholeAngle | Mode::Hold) && before.mode == state.mode {
-        kani::cover!(true, "in operation still");
-        // windows in a row in which all was well
-        assert!(state.windows == 0 || calm(&supervisor, &state, &o, 0));
+    if before.mode != Mode::Fault && state.mode != Mode::Fault {
+        kani::cover!(true, "no fault");
+        if !calm(&supervisor, &state, &o, supervisor.endure) {
+            kani::cover!(true, "not well for the time that is endured");
+            assert!(state.bad >= before.bad && state.clipped == before.clipped + u32::from(o.clipped) + slack);
+        }
+        if !calm(&supervisor, &state, &o, supervisor.forget) {
+            kani::cover!(true, "not well for the time to forget");
+            assert!(state.coasts >= before.coasts && state.starts == before.starts);
+        }
+        if in_operation(before.mode) && starting(state.mode) {
+            kani::cover!(true, "out of operation");
+            // by the wish for another mode, or counted
+            assert!(state.coasts == before.coasts + 1 || (state.mode == Mode::SpinUp && state.trying == 0));
+            assert!(state.coasts <= MOST_COASTS || state.mode == Mode::SpinUp);
+        }
+        let high = o.valid && o.pendulum.e > supervisor.high_2 && !o.jumped;
+        if high && in_operation(before.mode) && in_operation(state.mode) && before.mode == state.mode {
+            kani::cover!(true, "too high");
+            assert!(state.bad == before.bad + 1 && state.bad < supervisor.endure);
+        }
+        if matches!(state.mode, Mode::WholeAngle | Mode::Hold) && before.mode == state.mode {
+            kani::cover!(true, "in operation still");
+            // windows in a row in which all was well
+            assert!(state.windows == 0 || calm(&supervisor, &state, &o, 0));
+        }
     }
 }
 

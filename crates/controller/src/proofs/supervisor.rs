@@ -102,6 +102,7 @@ fn supervisor_is_total<T: Float + Arbitrary>(kept: impl Fn(&Observation<T>) -> b
     kani::cover!(state.fault == Some(Fault::DeadChannel) && state.mode == Mode::Fault, "a fault");
     kani::cover!(matches!(orders, Orders::Sweep { .. }), "a sweep");
     if state.mode == Mode::Fault {
+        kani::cover!(true, "in a fault");
         assert!(state.fault.is_some() && orders == Orders::Rest);
     }
     if state.wish == Wish::Off || !kept(&o) {

@@ -29,6 +29,7 @@ fn misaligned_forces_are_bounded<T: Float + Arbitrary>(share: T) {
         assert!(force >= -most && force <= most);
     }
     if theta_error == T::zero() {
+        kani::cover!(true, "aligned");
         assert!(f.a_s == gain * v.v_as && f.q_c == gain * v.v_qc);
         assert!(f.q_s == T::zero() && f.a_c == T::zero());
     }

@@ -18,6 +18,7 @@ pub(super) fn faults(functions: &[Function], known: &[Function]) -> Vec<String> 
         for called in source::reached(f, known) {
             found.extend(unlabelled(called));
             found.extend(unseen(called));
+            found.extend(early(called));
             found.extend(not_compiled(called));
         }
     }
@@ -45,23 +46,46 @@ fn asserts(text: &str) -> bool {
     ["assert!(", "assert_eq!(", "assert_ne!("].iter().any(|call| calls(text, call))
 }
 
+/// The lines of a body without what is only said.
+fn code(f: &Function) -> Vec<&str> {
+    let spoken = |line: &&str| line.trim_start().starts_with("//");
+    f.body.lines().map(|line| if spoken(&line) { "" } else { line.split(" // ").next().unwrap_or(line) }).collect()
+}
+
+fn claims(f: &Function) -> bool {
+    asserts(&code(f).join("\n"))
+}
+
 /// What is claimed and assumed stands in a body that the twin has too.
 fn own_claims(f: &Function) -> Option<String> {
-    let own = asserts(&f.body) || ["kani::any", "kani::assume", "kani::cover"].iter().any(|call| f.body.contains(call));
+    let own = claims(f) || ["kani::any", "kani::assume", "kani::cover"].iter().any(|call| f.body.contains(call));
     own.then(|| at(f, "claims or assumes something itself: the body belongs to it and its twin alike"))
 }
 
-/// A proof and its twin call one body that asserts something.
+/// A proof and its twin call one body that asserts something, the same, on the same scalar.
 fn unrelated(f: &Function, functions: &[Function], known: &[Function]) -> Option<String> {
     let claim = f.name.strip_prefix("proof_")?;
     let twin = functions.iter().find(|t| t.name == format!("twin_{claim}"))?;
+    // each with the scalar that it is called on: body::<f32>
     let bodies = |f: &Function| -> BTreeSet<String> {
-        let words = f.body.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).filter(|w| *w != f.name);
-        let named = words.filter_map(|word| known.iter().find(|g| g.name == word));
-        let asserting = named.filter(|g| source::reached(g, known).iter().any(|h| asserts(&h.body)));
-        asserting.map(|g| g.name.clone()).collect()
+        let lines = code(f);
+        let calls =
+            lines.iter().flat_map(|line| line.split([' ', '(', ')', ';', '{', '}', '&'])).filter(|w| *w != f.name);
+        let name = |call: &str| call.split("::<").next().unwrap_or(call).rsplit("::").next().map(str::to_owned);
+        let asserting = calls.filter(|call| {
+            let g = name(call).and_then(|name| known.iter().find(|g| g.name == name));
+            g.is_some_and(|g| source::reached(g, known).iter().any(|h| claims(h)))
+        });
+        asserting.map(str::to_owned).collect()
     };
-    bodies(f).is_disjoint(&bodies(twin)).then(|| at(f, "has a twin that is not about the same body"))
+    let (of_proof, of_twin) = (bodies(f), bodies(twin));
+    if of_proof != of_twin {
+        Some(at(f, "has a twin that is not about the same body"))
+    } else if of_proof.len() > 1 {
+        Some(at(f, "claims more than one body, of which the twin plants an error in any"))
+    } else {
+        None
+    }
 }
 
 /// A statement at the margin of a function's body, with the comment right above it.
@@ -111,46 +135,44 @@ fn unlabelled(f: &Function) -> Option<String> {
     silent.map(|s| at(f, &format!("assumes without saying why: {}", s.lines[0].trim())))
 }
 
-/// An assertion under a condition comes with a cover under the same one: in its block, or of all that the condition says.
+/// An assertion in a block comes with a cover in the same block; in a loop over what is written out it always comes.
 fn unseen(f: &Function) -> Option<String> {
-    let lines: Vec<&str> = f.body.lines().collect();
-    let covered: Vec<BTreeSet<String>> = f
-        .body
-        .split("cover!(")
-        .skip(1)
-        .filter_map(|call| call.split_once(");").and_then(|(arguments, _)| arguments.rsplit_once(", \"")))
-        .map(|(condition, _)| conjuncts(condition))
-        .collect();
-    for (n, line) in lines.iter().enumerate() {
+    let lines = code(f);
+    for (n, line) in lines.iter().enumerate().skip(1) {
         let text = line.trim();
-        let opens =
-            text.ends_with('{') && (text.starts_with("if ") || text.starts_with("} else") || text.contains("=> {"));
-        if !opens {
+        if asserts(text) && !["assert!(", "assert_eq!(", "assert_ne!("].iter().any(|call| text.starts_with(call)) {
+            return Some(at(
+                f,
+                &format!("asserts in the middle of a line, where no cover shows that it comes: {text}"),
+            ));
+        }
+        let written_out = text.starts_with("for ") && text.contains(" in [") && !text.contains(" in []");
+        if !text.ends_with('{') || written_out {
             continue;
         }
         let end = (n + 1..lines.len())
             .find(|&k| indentation(lines[k]) == indentation(line) && lines[k].trim().starts_with('}'));
         let block = &lines[n + 1..end.unwrap_or(lines.len())];
-        let condition = conjuncts(text.trim_start_matches("if ").trim_end_matches('{'));
-        let seen = block.iter().any(|l| l.contains("cover!("))
-            || (text.starts_with("if ") && covered.iter().any(|c| c.is_superset(&condition)));
-        if block.iter().any(|l| asserts(l)) && !seen {
+        if block.iter().any(|l| asserts(l)) && !block.iter().any(|l| l.contains("cover!(")) {
             return Some(at(f, &format!("asserts where no cover shows that it comes: {text}")));
         }
     }
     None
 }
 
-/// a && b && c, each for itself and without its line breaks.
-fn conjuncts(condition: &str) -> BTreeSet<String> {
-    let words = condition.split_whitespace().collect::<Vec<_>>().join(" ");
-    words.split(" && ").map(|part| part.trim().to_owned()).collect()
+/// What returns before its claims assumes that it does not, and says so as an assumption does.
+fn early(f: &Function) -> Option<String> {
+    let leaves = |line: &str| {
+        let mut words = line.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        words.any(|word| ["return", "continue", "break"].contains(&word)) || line.contains("?;") || line.contains("?.")
+    };
+    let found = code(f).into_iter().skip(1).find(|line| leaves(line)).filter(|_| claims(f));
+    found.map(|line| at(f, &format!("may return before its claims: {}", line.trim())))
 }
 
 /// An assertion of debug builds is not in the release build that is proved.
 fn not_compiled(f: &Function) -> Option<String> {
-    let code = f.body.lines().filter(|line| !line.trim().starts_with("//"));
-    let debug = code.into_iter().any(|line| calls(line, "debug_assert"));
+    let debug = code(f).into_iter().any(|line| calls(line, "debug_assert"));
     debug.then(|| at(f, "has a debug_assert, which is not compiled into what is proved"))
 }
 
@@ -171,7 +193,11 @@ fn square_is_small<T>(claimed: f32) {
     let y = x * x;
     kani::cover!(y > 0.5, "more than half");
     if y > 0.5 {
+        kani::cover!(true, "more than half, in its block");
         assert!(y <= claimed);
+    }
+    for share in [x, y] {
+        assert!(share >= 0.0);
     }
     if y < 0.1 {
         kani::cover!(true, "less than a tenth");
@@ -221,23 +247,59 @@ pub fn twin_square_is_small() {
 
     #[test]
     fn an_assertion_that_is_never_reached_needs_a_cover() {
-        let dead =
-            changed("    if y < 0.1 {\n", "    if y > 2.0 {\n        assert!(y == 42.0);\n    }\n    if y < 0.1 {\n");
-        assert!(dead.contains("no cover shows that it comes: if y > 2.0 {"), "{dead}");
+        let refused = |block: &str| {
+            let found = changed("    if y < 0.1 {\n", &format!("{block}    if y < 0.1 {{\n"));
+            assert!(found.contains("no cover shows that it comes"), "{block}{found}");
+        };
+        refused("    if y > 2.0 {\n        assert!(y == 42.0);\n    }\n");
+        refused("    if y > 2.0 {\n        // kani::cover!(true, \"only said\")\n        assert!(y == 42.0);\n    }\n");
+        refused("    if y > 2.0 {\n        assert!(y == 42.0); // cover!(\n    }\n");
+        // the name is another value by then
+        refused("    let y = 0.0;\n    if y > 0.5 {\n        assert!(y == 42.0);\n    }\n");
+        refused("    for _ in 0..0 {\n        assert!(y == 42.0);\n    }\n");
+        refused("    for _ in [] {\n        assert!(y == 42.0);\n    }\n");
+        refused("    while y > 2.0 {\n        assert!(y == 42.0);\n    }\n");
+        refused("    let never = |y: f32| {\n        assert!(y == 42.0);\n    };\n");
+        refused("    let never = |y: f32| assert!(y == 42.0);\n");
+        refused("    None::<f32>.map(|y| assert!(y == 42.0));\n");
+        refused("    match y > 2.0 {\n        true => assert!(y == 42.0),\n        false => {}\n    }\n");
         let other = changed(
             "    }\n    if y < 0.1 {\n",
-            "    } else {\n        assert!(y == 42.0);\n    }\n    if y < 0.1 {\n",
+            "    }\n    if y > 0.9 {\n        kani::cover!(true, \"nearly all\");\n    } else {\n        assert!(y == 42.0);\n    }\n    if y < 0.1 {\n",
         );
         assert!(other.contains("no cover shows that it comes: } else {"), "{other}");
-        let narrower = changed("    if y > 0.5 {\n", "    if y > 0.5 && x > 2.0 {\n");
-        assert!(narrower.contains("if y > 0.5 && x > 2.0 {"), "{narrower}");
+    }
+
+    #[test]
+    fn a_return_before_the_claims_is_an_assumption_without_a_name() {
+        for leaves in [
+            "    if x != 1.0 {\n        return;\n    }\n",
+            "    let Some(x) = Some(x).filter(|x| *x == 1.0) else { return };\n",
+            "    let x = Some(x).filter(|x| *x == 1.0)?;\n",
+        ] {
+            let found = changed("    let y = x * x;\n", &format!("{leaves}    let y = x * x;\n"));
+            assert!(found.contains("may return before its claims"), "{leaves}{found}");
+        }
+        let passed = changed(
+            "    for share in [x, y] {\n",
+            "    for share in [x, y] {\n        if share > 0.0 {\n            continue;\n        }\n",
+        );
+        assert!(passed.contains("may return before its claims: continue;"), "{passed}");
     }
 
     #[test]
     fn a_twin_of_another_claim_is_none() {
         let other = "\nfn other() {\n    assert!(kani::any::<u32>() != 7);\n}\n";
-        let text = SOUND.replacen("    square_is_small(0.6);", "    other();", 1) + other;
-        assert!(found(&text).contains("proof_square_is_small has a twin that is not about the same body"));
+        let of = |twin: &str| found(&(SOUND.replacen("    square_is_small(0.6);", twin, 1) + other));
+        let none = "proof_square_is_small has a twin that is not about the same body";
+        assert!(of("    other();").contains(none));
+        // true of the body, and an error planted beside it
+        assert!(of("    square_is_small(1.0);\n    other();").contains(none));
+        assert!(of("    square_is_small(1.0); // other()").is_empty());
+        // another scalar, of which nothing is proved
+        assert!(of("    square_is_small::<f64>(0.6);").contains(none));
+        let both = found(&(SOUND.replace("    square_is_small(", "    other();\n    square_is_small(") + other));
+        assert!(both.contains("claims more than one body"), "{both}");
         let inline = changed("    square_is_small(0.6);", "    assert!(kani::any::<u32>() != 7);");
         assert!(inline.contains("twin_square_is_small claims or assumes something itself"), "{inline}");
     }
