@@ -273,3 +273,7 @@ impl<T: Float> Calibrator<T> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "tests/replay.rs"]
+mod tests;

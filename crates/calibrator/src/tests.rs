@@ -7,6 +7,7 @@ extern crate std;
 mod commits;
 mod cycles;
 mod mechanics;
+mod precision;
 mod sums;
 
 use cvg_model::Envelope;
@@ -16,12 +17,23 @@ use crate::parameters::{N, Parameter, Vector};
 use crate::{Calibrator, Settings};
 
 /// No two of the settings are the same number, and none is one.
-fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     Settings { amplitude_v: 1.6, drive_per_s: 2.5, damping_per_s: 0.04, ..Settings::default() }
 }
 
-fn calibrator() -> Calibrator<f64> {
+pub(crate) fn calibrator() -> Calibrator<f64> {
     Calibrator::new(&settings()).expect("inside its domain")
+}
+
+#[test]
+fn a_cycle_lasts_ten_to_a_hundred_milliseconds() {
+    let of = |control_s: f64, steps: u16| Calibrator::<f64>::new(&Settings { control_s, steps, ..settings() });
+    for (control_s, steps) in [(1.3e-4, 80), (1e-3, 80), (1e-3, 99)] {
+        of(control_s, steps).expect("inside");
+    }
+    for (control_s, steps) in [(1.2e-4, 80), (1e-3, 101), (1e-3, 79), (f64::NAN, 80)] {
+        assert_eq!(of(control_s, steps).expect_err("outside").parameter, "steps", "{control_s} {steps}");
+    }
 }
 
 /// One parameter moved by a value in its own unit.
@@ -59,6 +71,6 @@ fn apart(a: &Envelope<f64>, b: &Envelope<f64>) -> [f64; 3] {
 }
 
 #[track_caller]
-fn near(got: f64, expected: f64, tolerance: f64) {
+pub(crate) fn near(got: f64, expected: f64, tolerance: f64) {
     assert!((got - expected).abs() <= tolerance, "{got} and not {expected}");
 }

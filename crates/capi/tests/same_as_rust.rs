@@ -25,7 +25,8 @@ struct Of {
 }
 
 impl Of {
-    fn settings(settings: &Settings) -> Result<Self, String> {
+    /// What is built, or the parameter that is refused and what it has to be.
+    fn settings(settings: &Settings) -> Result<Self, [String; 2]> {
         // SAFETY: both are arrays of integers
         let mut of = unsafe { Self { instrument: std::mem::zeroed(), state: std::mem::zeroed() } };
         // SAFETY: they are such structures
@@ -33,9 +34,11 @@ impl Of {
         if said.parameter_length == 0 {
             return Ok(of);
         }
-        // SAFETY: a text of that length
-        let text = unsafe { std::slice::from_raw_parts(said.parameter.cast::<u8>(), said.parameter_length) };
-        Err(String::from_utf8_lossy(text).into_owned())
+        Err([(said.parameter, said.parameter_length), (said.expected, said.expected_length)].map(|(text, length)| {
+            // SAFETY: a text of that length
+            let text = unsafe { std::slice::from_raw_parts(text.cast::<u8>(), length) };
+            String::from_utf8_lossy(text).into_owned()
+        }))
     }
 
     fn step(&mut self, x: f32, y: f32) -> Output {
@@ -359,8 +362,8 @@ fn what_rust_refuses_c_is_refused_with_its_name() {
     let of = |change: fn(&mut Rust)| {
         let mut settings = Rust::default();
         change(&mut settings);
-        let rust = Instrument::<f32>::new(&settings).expect_err("outside its domain").parameter;
-        assert_eq!(Of::settings(&in_c(&settings)).err().as_deref(), Some(rust));
+        let rust = Instrument::<f32>::new(&settings).expect_err("outside its domain");
+        assert_eq!(Of::settings(&in_c(&settings)).err(), Some([rust.parameter, rust.expected].map(str::to_owned)));
     };
     of(|s| s.dac_limit_v = f64::NAN);
     of(|s| s.window = 0);
@@ -368,15 +371,22 @@ fn what_rust_refuses_c_is_refused_with_its_name() {
     // what acts through a sum alone is told apart by its name
     of(|s| s.readout_delay_s = -1e-6);
     of(|s| s.drive_delay_s = -1e-6);
-    let name = CString::new("no-such-effect").expect("no zero");
+    // a name is the whole of it
+    let names = ["no-such-effect", "detection-skew-and-more", "detection-ske", ""];
+    let [name, others @ ..] = names.map(|name| CString::new(name).expect("no zero"));
+    for name in [&name].into_iter().chain(&others) {
+        let effect = Effect { id: name.as_ptr(), values: [0.0; 4] };
+        let settings = Settings { readout: &raw const effect, readout_count: 1, ..in_c(&Rust::default()) };
+        let refused = ["effects", "effects of the library"].map(str::to_owned);
+        assert_eq!(Of::settings(&settings).err(), Some(refused), "{name:?}");
+    }
     let effect = Effect { id: name.as_ptr(), values: [0.0; 4] };
-    let settings = Settings { readout: &raw const effect, readout_count: 1, ..in_c(&Rust::default()) };
-    Of::settings(&settings).map(|_| ()).expect_err("there is none of that name");
     let settings = Settings { readout: &raw const effect, readout_count: 5, ..in_c(&Rust::default()) };
     Of::settings(&settings).map(|_| ()).expect_err("more than there is room for");
     let nameless = Effect { id: null(), values: [0.0; 4] };
     let settings = Settings { readout: &raw const nameless, readout_count: 1, ..in_c(&Rust::default()) };
-    assert_eq!(Of::settings(&settings).err().as_deref(), Some("effects"), "an effect has a name");
+    let refused = ["effects", "named"].map(str::to_owned);
+    assert_eq!(Of::settings(&settings).err(), Some(refused), "an effect has a name");
     // none where nothing is pointed to, whatever is counted, and where nothing is counted
     for (readout, readout_count) in [(null(), 2), (&raw const nameless, 0)] {
         let of = Of::settings(&Settings { readout, readout_count, ..in_c(&Rust::default()) }).expect("no effects");

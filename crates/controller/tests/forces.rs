@@ -126,6 +126,31 @@ fn the_rate_loop_is_its_law_scaled_by_the_amplitude() {
     }
 }
 
+/// The angle error is that of the axes: an ellipse is held as a line of its energy.
+#[test]
+fn an_ellipse_is_held_as_a_line_of_its_energy() {
+    let rate = RateLoop::tuned(12.0, 0.75, 1.5, 10.0, 5e-4, LIMIT_V).expect("valid");
+    let target = Heading::new(0.3).expect("finite");
+    for (a, q) in [(0.8, 0.6), (0.8, -0.6), (0.96, 0.28)] {
+        let held = |p: &Pendulum<f64>| rate.step(&mut PiState::default(), p, &target).volts;
+        let ellipse = Orbit { a, q, theta: 0.4, delta: 0.0 }.envelope().pendulum();
+        assert_abs_diff_eq!(held(&ellipse), held(&off(1.0, 0.1)), epsilon = 1e-12);
+    }
+}
+
+/// Two effects of a kind act one after the other, and are both undone.
+#[test]
+fn of_two_skews_of_the_drives_both_are_undone() {
+    let skewed = |skews: &[f64]| {
+        let effects: Vec<_> = skews.iter().map(|s| (EffectId::ActuationSkew, [*s, 0.0, 0.0, 0.0])).collect();
+        let drives = Allocation::new(Some(ActuationCompensation::new(&effects).expect("regular")), LIMIT_V);
+        let command = OrbitCommands { v_as: 1.0, v_qs: 0.25, v_qc: -0.5, v_ac: 0.125 };
+        drives.expect("valid").step(&command, 0.75, 0.5).volts
+    };
+    assert_eq!(skewed(&[0.25, 0.5]), skewed(&[0.75]));
+    assert_ne!(skewed(&[0.25, 0.5]), skewed(&[0.25]));
+}
+
 /// Every heading, a pattern beside it, to so many units of rounding.
 fn a_heading_is_approached_from_both_sides<T: Float>(rounding: f64) {
     let t = T::from_f64;

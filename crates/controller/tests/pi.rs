@@ -81,6 +81,10 @@ fn parameters_outside_their_domain_are_refused_by_name() {
     assert_eq!(refused(Pi::new(1.0, f64::NAN, 1.0, 1.0)), Some("integration_time_s"));
     assert_eq!(refused(Pi::new(1.0, 1.0, -1.0, 1.0)), Some("period_s"));
     assert_eq!(refused(Pi::new(1.0, 1.0, 1.0, f64::INFINITY)), Some("limit_v"));
+    // each is a number, and what follows from them is not, or nothing
+    assert_eq!(refused(Pi::new(1.0, 1.7e308, 1.0, 1.0)), Some("integration_time_s"));
+    assert_eq!(refused(Pi::new(1e-300, 1e10, 1.0, 1e10)), Some("2 integration_time_s limit_v/gain"));
+    assert_eq!(refused(Pi::new(1e300, 1e-30, 1.0, 1e-30)), Some("2 integration_time_s limit_v/gain"));
     assert_eq!(refused(Pi::tuned(2000.0, 1.0, 1.0, 1.0, PERIOD_S, 1.0)), Some("bandwidth_rad_s"));
 }
 
@@ -88,12 +92,12 @@ fn parameters_outside_their_domain_are_refused_by_name() {
 fn an_integral_beyond_its_limit_counts_as_the_limit_and_goes_on_from_there() {
     let pi = pi();
     let most = 2.0 * 0.25 * LIMIT_V / 7.8;
-    for sign in [1.0, -1.0] {
+    for (sign, back) in [(1.0, 0.1), (-1.0, 0.1), (1.0, 1.3), (-1.0, 1.3)] {
         let mut state = PiState { integral: sign * 5.0 };
-        let command = pi.control(&mut state, sign * -0.1);
-        let integral = sign * (most - 0.1 * PERIOD_S);
+        let command = pi.control(&mut state, sign * -back);
+        let integral = sign * (most - back * PERIOD_S);
         assert_abs_diff_eq!(state.integral, integral, epsilon = 1e-15);
-        assert_abs_diff_eq!(command.volts, 7.8 * (sign * -0.1 + integral / 0.5), epsilon = 1e-12);
+        assert_abs_diff_eq!(command.volts, 7.8 * (sign * -back + integral / 0.5), epsilon = 1e-12);
         assert_eq!(command.status, Status::Within);
     }
 }

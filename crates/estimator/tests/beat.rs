@@ -85,3 +85,15 @@ fn the_phase_ahead_is_that_of_the_orbit_in_every_quadrant() {
         }
     }
 }
+
+#[test]
+fn the_phase_of_nothing_or_of_no_number_is_none() {
+    let nan = f64::NAN;
+    assert_eq!(phase_ahead(&Envelope::<f64>::zero()), (1.0, 0.0));
+    for e in
+        [[nan, 0.1, 0.2, 0.3], [0.1, nan, 0.2, 0.3], [0.1, 0.2, nan, 0.3], [0.1, 0.2, 0.3, nan], [1e200, 0.0, 0.0, 0.0]]
+    {
+        let [x_c, x_s, y_c, y_s] = e;
+        assert_eq!(phase_ahead(&Envelope::new(x_c, x_s, y_c, y_s)), (1.0, 0.0), "{e:?}");
+    }
+}

@@ -126,6 +126,11 @@ fn a_sample_at_the_end_of_the_range_is_counted_and_one_that_is_no_number_too() {
         (-9.0, -FULL_SCALE_V, 0, 1),
         (9.0, FULL_SCALE_V, 0, 1),
         (end, end, 0, 1),
+        (-end, -end, 0, 1),
+        // between where clipping begins and the end of the range: as it is
+        (1.9999, 1.9999, 0, 1),
+        (-1.9999, -1.9999, 0, 1),
+        (-FULL_SCALE_V, -FULL_SCALE_V, 0, 1),
         (1.9997, 1.9997, 0, 0),
     ];
     for (v, taken, invalid, clipped) in cases {

@@ -93,3 +93,21 @@ fn a_direction_that_rounding_made_too_long_is_one_still() {
     one::<f32>();
     one::<f64>();
 }
+
+/// Of an envelope whose squares are below what the machine holds in full the direction is not told.
+#[test]
+fn squares_that_rounding_took_are_no_direction() {
+    fn tiny<T: Float>(a: f64) {
+        for degrees in (-180..180).step_by(15) {
+            let theta = f64::from(degrees).to_radians();
+            let told = |a| {
+                let e = rounded::<T>(&Orbit { a, q: 0.0, theta, delta: 0.0 }.envelope());
+                major_axis(&e, &e.pendulum()).status
+            };
+            assert_eq!(told(a), Status::Undetermined, "{degrees}");
+            assert_eq!(told(1e5 * a), Status::Valid, "{degrees}");
+        }
+    }
+    tiny::<f32>(2e-11);
+    tiny::<f64>(1e-78);
+}

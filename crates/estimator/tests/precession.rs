@@ -234,6 +234,14 @@ fn a_motion_beyond_a_jump_leads_no_farther_than_one() {
 }
 
 #[test]
+fn a_direction_that_is_led_ahead_is_as_valid_as_it_was() {
+    let state = PrecessionState { sin_2_per_window: 0.1, ..PrecessionState::default() };
+    for status in [Status::Valid, Status::Undetermined, Status::Invalid] {
+        assert_eq!(tracker().ahead(&state, &Direction { cos: 0.6, sin: 0.8, status }).status, status);
+    }
+}
+
+#[test]
 fn parameters_outside_their_domain_are_refused_by_name() {
     let good = [WINDOW_S, SMOOTHING_S, FASTEST_RAD_S, LEAST_JUMP_RAD, 0.75, LEAST_V];
     let new = |changes: &[(usize, f64)]| {

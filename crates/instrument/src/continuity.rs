@@ -51,3 +51,30 @@ impl Continuity {
         self.counting |= sight.in_operation;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Continuity, Movement, Sight};
+
+    const SEEN: Sight = Sight {
+        valid: true,
+        clear: true,
+        movement: Movement::Steady,
+        interrupted: false,
+        in_operation: true,
+        in_fault: false,
+    };
+
+    #[test]
+    fn windows_of_converters_that_clip_or_repeat_themselves_do_not_show_the_pattern() {
+        for unseen in [Sight { clear: false, ..SEEN }, Sight { valid: false, ..SEEN }] {
+            let mut count = Continuity { counting: true, ..Continuity::default() };
+            for n in 1..=6 {
+                count.see(unseen, 4, || true);
+                assert_eq!((count.unseen, count.lost), (n, n > 4), "{unseen:?}");
+            }
+            count.see(SEEN, 4, || true);
+            assert_eq!((count.unseen, count.lost), (0, true), "until it is acknowledged");
+        }
+    }
+}

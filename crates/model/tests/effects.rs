@@ -52,6 +52,8 @@ fn linear_readouts_are_their_matrices_and_offsets() {
     reads(EffectId::DetectionGainMismatch, [1.25, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
     // 1 + 0.1 · 2.5 s
     reads(EffectId::GainDrift, [0.1, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
+    // 1 + 0.05/K · 5 K
+    reads(EffectId::Temperature, [0.05, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
     let skewed = Envelope::new(x_c, x_s, y_c + 0.5 * x_c, y_s + 0.5 * x_s);
     reads(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0], skewed, 1e-15);
     let offset = Envelope::new(x_c + 0.1, x_s, y_c - 0.3, y_s);

@@ -3,7 +3,7 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use approx::assert_abs_diff_eq;
-use cvg_model::{Envelope, Orbit};
+use cvg_model::{Envelope, Orbit, Pendulum};
 
 #[test]
 fn an_orbit_is_found_again_in_its_envelope_at_every_orientation_and_phase() {
@@ -51,4 +51,19 @@ fn at_rest_and_on_a_circle_there_is_no_orientation() {
     assert_eq!(Envelope::zero().orbit(), Orbit::<f64>::default());
     let circle = Envelope::new(1.0, 0.0, 0.0, 1.0).orbit();
     assert_eq!((circle.a, circle.q, circle.theta), (1.0, 1.0, 0.0));
+}
+
+/// The variables are squares of the envelope: their difference between two envelopes is twice the rate at the middle.
+#[test]
+fn the_rates_of_the_variables_are_their_differences() {
+    let parts = |p: Pendulum<f64>| [p.e, p.q, p.r, p.s, p.l];
+    let z = Envelope::new(0.5, -0.25, 0.75, 1.0);
+    for d in
+        [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.5, -2.0, 1.5, 0.25]]
+    {
+        let d = Envelope::new(d[0], d[1], d[2], d[3]);
+        let (there, here) = (parts((z + d).pendulum()), parts((z - d).pendulum()));
+        let difference: Vec<f64> = there.iter().zip(here).map(|(a, b)| (a - b) / 2.0).collect();
+        assert_eq!(parts(z.pendulum_rate(&d))[..], difference[..], "{d:?}");
+    }
 }

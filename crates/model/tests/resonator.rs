@@ -1,9 +1,10 @@
 //! The mechanics term by term: what a unit of each coordinate is pulled by, and how an envelope moves.
 
-use cvg_model::Envelope;
+use cvg_model::resonator::averaged::Averages;
 use cvg_model::resonator::carrier::{Motion, Rotation};
 use cvg_model::resonator::envelope::precession;
 use cvg_model::resonator::{Anisotropy, Resonator};
+use cvg_model::{Envelope, Orbit};
 
 #[test]
 fn a_turning_base_weakens_the_springs_and_couples_the_axes() {
@@ -50,4 +51,30 @@ fn a_mode_ahead_of_the_reference_gains_phase_and_its_pattern_stays() {
     // and Ω = 4 rad/s precesses at −kΩ = −3 rad/s
     assert_eq!(e.precession(&resonator.envelope_rate(&e, 4.0, 0.0)), -3.0);
     assert_eq!(e.precession(&precession(0.3, &e)), 0.3);
+}
+
+/// The averages move as the envelope does, on lines and on ellipses of either sense, at every orientation.
+#[test]
+fn the_averages_are_those_of_the_envelope() {
+    let device = Resonator {
+        omega_rad_s: 1e5,
+        angular_gain: 0.8,
+        centrifugal_gain: 1.0,
+        damping_per_s: 0.5,
+        anisodamping: Anisotropy { cos2: 0.3, sin2: -0.2 },
+        anisoelasticity: Anisotropy { cos2: -1.5, sin2: 2.0 },
+    };
+    for degrees in (-180..180).step_by(20) {
+        for (a, q) in [(1.0, 0.0), (0.8, 0.6), (0.8, -0.6), (1.2, 0.1)] {
+            let orbit = Orbit { a, q, theta: f64::from(degrees).to_radians(), delta: 0.0 };
+            let (z, rate_rad_s) = (orbit.envelope(), 0.7);
+            let p = z.pendulum();
+            let moves = device.envelope_rate(&z, rate_rad_s, 0.0);
+            let expected = (z.pendulum_rate(&moves), z.precession(&moves));
+            let averaged = device.averaged_rate(&Averages { e: p.e, q: p.q, theta: orbit.theta }, rate_rad_s);
+            assert!((averaged.e - expected.0.e).abs() < 1e-13, "{degrees} {q}: {averaged:?}");
+            assert!((averaged.q - expected.0.q).abs() < 1e-13, "{degrees} {q}: {averaged:?}");
+            assert!((averaged.theta - expected.1).abs() < 1e-13, "{degrees} {q}: {averaged:?}");
+        }
+    }
 }

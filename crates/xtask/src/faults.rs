@@ -11,6 +11,7 @@ mod edges;
 mod estimator;
 mod instrument;
 mod model;
+mod other_hands;
 mod regression;
 mod single;
 mod unseen;
@@ -60,6 +61,7 @@ fn library() -> Vec<Fault> {
         instrument::FAULTS,
         edges::FAULTS,
         unseen::FAULTS,
+        other_hands::FAULTS,
         single::FAULTS,
     ]
     .concat()

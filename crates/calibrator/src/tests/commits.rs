@@ -176,6 +176,15 @@ fn each_stage_commits_what_it_may_and_forgets_as_it_should() {
                     && after.correction.drives == before.correction.drives;
                 assert!(!moved || !unmoved, "stage {stage}: {p:?}");
             }
+            if stage == 0 {
+                // the coarse ones alone: of the drives their scale
+                for p in P::ALL.into_iter().filter(|p| !coarse.contains(p)) {
+                    assert_eq!(after.correction.known[p as usize], before.correction.known[p as usize], "{p:?}");
+                }
+                let drives = after.correction.drives;
+                assert_eq!((drives.xx, drives.xy, drives.yx), (drives.yy, Complex::real(0.0), Complex::real(0.0)));
+                assert_eq!(drives.xx.im, 0.0);
+            }
             // of the detection the first two say nothing yet
             if stage < 2 {
                 assert_eq!(after.filter.mean[OTHERS..], before.filter.mean[OTHERS..]);

@@ -154,6 +154,94 @@ fn an_innovation_beyond_six_deviations_is_refused_in_the_last_stage() {
     assert_eq!((s.schedule.hold[2], s.filter.seen[2], s.filter.shown[2]), (0, 0.0, [0.0; N]));
 }
 
+/// Each stage trusts what is seen as far as its floor says: of a parameter that shows by as much, half is learned.
+#[test]
+fn each_stage_has_a_floor_of_its_own() {
+    for (stage, floor) in [(0, 1e-3), (1, 5e-4), (2, 1e-4), (3, 2e-5), (4, 3e-6), (5, 3e-6), (u8::MAX, 3e-6)] {
+        let mut s = busy();
+        s.schedule.stage = stage;
+        (s.filter.mean, s.filter.noise, s.schedule.fresh) = ([0.0; N], [1e-18; CHANNELS], 1);
+        s.filter.shown[0] = unit(P::Damping, floor);
+        s.filter.seen[0] = floor;
+        for k in 0..20 {
+            calibrator().measure(&mut s, 0, k);
+        }
+        near(s.filter.mean[P::Damping as usize], 0.5, 1e-6);
+    }
+}
+
+/// A channel that is refused for a second begins anew with the next refusal.
+#[test]
+fn a_channel_that_is_refused_for_a_second_begins_anew() {
+    for c in [0, 2] {
+        for (held, after) in [(23, 24), (24, 25), (25, 0)] {
+            let mut s = busy();
+            (s.schedule.hold[c], s.filter.seen[c]) = (held, 1e3);
+            let before = s;
+            for k in 0..=6 {
+                calibrator().measure(&mut s, c, k);
+            }
+            assert_eq!((s.schedule.accept, s.schedule.hold[c]), (false, after));
+            let anew = if after == 0 { ([0.0; N], 0.0) } else { (before.filter.shown[c], 1e3) };
+            assert_eq!((s.filter.shown[c], s.filter.seen[c]), anew, "{held}");
+        }
+    }
+}
+
+/// The detection is told by the amplitude while the instrument turns, and by nothing else.
+#[test]
+fn a_detection_is_told_while_it_turns() {
+    for c in 0..CHANNELS {
+        for excited in [false, true] {
+            let mut s = busy();
+            (s.schedule.excited, s.schedule.untold) = (excited, 77);
+            for k in 0..20 {
+                calibrator().measure(&mut s, c, k);
+            }
+            assert!(s.schedule.accept);
+            assert_eq!(s.schedule.untold, if c == 0 && excited { 0 } else { 77 }, "{c} {excited}");
+        }
+    }
+    // and each cycle is one since
+    for (before, after) in [(0, 1), (77, 78), (u16::MAX, u16::MAX)] {
+        let mut s = busy();
+        s.schedule.untold = before;
+        calibrator().plan(&mut s);
+        assert_eq!(s.schedule.untold, after);
+    }
+}
+
+/// What was learned in the first stage before it was noticed that the base turns is no rest.
+#[test]
+fn a_turn_in_the_first_stage_begins_it_anew() {
+    for (stage, used) in [(0, 0), (1, 99), (4, 99)] {
+        let mut s = busy();
+        (s.sample.push.aside, s.schedule.turn) = (0.0, 5.0 * 0.1 / 25.0);
+        (s.schedule.stage, s.schedule.used, s.schedule.angle_used) = (stage, 99, 250);
+        calibrator().detect(&mut s);
+        assert_eq!((s.schedule.excited, s.schedule.used), (true, used), "stage {stage}");
+        let forgotten = s.filter.mean[..OTHERS].iter().all(|m| *m == 0.0);
+        assert_eq!(forgotten, stage == 0);
+    }
+}
+
+/// A cycle that is not whole is followed by none that could be compared with it.
+#[test]
+fn a_cycle_that_is_not_whole_is_not_the_one_before() {
+    let mut s = busy();
+    s.closed = crate::window::Sums::empty();
+    s.closed.spoil();
+    calibrator().close(&mut s);
+    assert_eq!((s.schedule.live, s.before.whole, s.schedule.settle), (false, false, 37));
+    // and nothing is done with what it holds
+    let before = s;
+    for k in 1..77 {
+        s.step = k;
+        calibrator().work(&mut s);
+    }
+    assert_eq!((s.filter.mean, s.filter.shown, s.schedule.fresh), (before.filter.mean, before.filter.shown, 10));
+}
+
 #[test]
 fn an_angle_that_is_held_back_is_not_used_and_begins_anew() {
     let mut s = busy();

@@ -135,6 +135,21 @@ fn after_a_rest_the_start_is_tried_again_as_often_as_is_set_and_then_after_long_
     assert_eq!((after.mode, after.trying, after.clipped, after.cause), (Mode::Listen, 0, 0, None));
 }
 
+/// A rest may be set so long that the long ones are longer than can be counted: they do not come round to short ones.
+#[test]
+fn a_long_rest_that_cannot_be_counted_is_the_longest_that_can() {
+    let patient = SupervisorSettings { rest_s: f64::from(1_u32 << 27) * WINDOW_S, ..settings() };
+    let patient = Supervisor::new(&patient).expect("valid");
+    let after = |windows| {
+        let fault = Some(Fault::NoLock);
+        let mut state = SupervisorState { starts: 2, fault, ..in_mode(Mode::Fault, windows) };
+        patient.step(&mut state, &well(), None);
+        state.mode
+    };
+    assert_eq!([1, 1 << 27, u32::MAX - 2].map(after), [Mode::Fault; 3]);
+    assert_eq!(after(u32::MAX - 1), Mode::Listen);
+}
+
 #[test]
 fn a_converter_that_is_stuck_is_not_started() {
     let stuck =
