@@ -48,6 +48,9 @@ pub(crate) struct Broken {
     pub(crate) wanted: String,
 }
 
+/// Rows from which on a command that never changes is none.
+const FEWEST_COMMANDS: usize = 50;
+
 /// Leaves out of a recording the rows that were not recorded anew, and says what cannot be mended.
 pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let mut findings = Findings::default();
@@ -216,6 +219,53 @@ impl<'a> Column<'a> {
     }
 }
 
+/// Takes an energy command that never changes for one that was not recorded, and says so: noise alone moves what holds an
+/// amplitude.
+pub(crate) fn without_dead_command(recording: &mut Recording, warnings: &mut Vec<String>) -> bool {
+    let never_changes = |v: &[f64]| v.windows(2).all(|v| v[0] == v[1]);
+    let is_dead = recording.vas_v.as_deref().is_some_and(|v| v.len() >= FEWEST_COMMANDS && never_changes(v));
+    if is_dead {
+        let v_as = recording.vas_v.take().and_then(|v| v.first().copied()).unwrap_or_default();
+        warnings.push(format!(
+            "{}: vas_v is {v_as} in every row: no loop gives that, and it counts as not recorded",
+            recording.source.display()
+        ));
+    }
+    is_dead
+}
+
+/// The same for commands that are written anew every few rows only, while the readout is in every row: what they did to the
+/// pattern in between is not known.
+pub(crate) fn without_held_commands(recording: &mut Recording, warnings: &mut Vec<String>) {
+    let columns = [("vas_v", &recording.vas_v), ("vqc_v", &recording.vqc_v)];
+    let held = columns.into_iter().find_map(|(name, v)| v.as_deref().and_then(rows_held).map(|rows| (name, rows)));
+    if let Some((name, rows)) = held {
+        (recording.vas_v, recording.vqc_v) = (None, None);
+        warnings.push(format!(
+            "{}: {name} is written anew every {rows} rows only: the commands count as not recorded; wanted: commands in \
+             every row, as the readout",
+            recording.source.display()
+        ));
+    }
+}
+
+/// For how many rows each value stands, where that is the same for nearly all: changes at regular rows, and of any size. A
+/// coarse converter changes by its own step, and when the value is due.
+fn rows_held(values: &[f64]) -> Option<usize> {
+    let changes: Vec<usize> = (1..values.len()).filter(|&i| values[i] != values[i - 1]).collect();
+    if changes.len() < FEWEST_COMMANDS {
+        return None;
+    }
+    let gaps: Vec<usize> = changes.windows(2).map(|c| c[1] - c[0]).collect();
+    let mut sorted = gaps.clone();
+    sorted.sort_unstable();
+    let usual = sorted[sorted.len() / 2];
+    let regular = gaps.iter().filter(|gap| gap.is_multiple_of(usual)).count();
+    let jumps = || changes.iter().map(|&i| (values[i] - values[i - 1]).abs());
+    let [least, largest] = [jumps().fold(f64::INFINITY, f64::min), jumps().fold(0.0, f64::max)];
+    (usual > 1 && regular * 10 >= gaps.len() * 9 && largest > 4.0 * least).then_some(usual)
+}
+
 /// Whether values that stood still over a range of rows made up for it afterwards in one jump; at the end of a recording,
 /// whether they usually step by more than their smallest step.
 fn caught_up<'a>(mut columns: impl Iterator<Item = &'a Column<'a>>, held: &Range<usize>, rows: usize) -> bool {
@@ -382,6 +432,37 @@ pub(super) mod tests {
             let value = v[rows.start];
             v[rows.clone()].fill(value);
         }
+    }
+
+    #[test]
+    fn an_energy_command_that_never_changes_is_none() {
+        for v_as in [0.0, -0.047] {
+            let (mut r, mut warnings) = (recorded(), Vec::new());
+            let rows = r.t_s.len();
+            r.vas_v = Some(vec![v_as; rows]);
+            assert!(without_dead_command(&mut r, &mut warnings) && r.vas_v.is_none());
+            assert!(warnings[0].contains("vas_v is") && warnings[0].contains("not recorded"), "{warnings:?}");
+            let mut moving = vec![v_as; rows];
+            moving[rows / 2] += 1e-9;
+            r.vas_v = Some(moving);
+            assert!(!without_dead_command(&mut r, &mut warnings) && r.vas_v.is_some());
+        }
+    }
+
+    #[test]
+    fn commands_that_are_written_every_few_rows_are_none() {
+        let swing = |i: usize| 0.05 * (0.013 * i as f64).sin() - 0.047;
+        let commands = |of: &dyn Fn(usize) -> f64| (0..2000).map(of).collect::<Vec<_>>();
+        assert_eq!(rows_held(&commands(&|i| swing(i / 10 * 10))), Some(10));
+        assert_eq!(rows_held(&commands(&swing)), None);
+        // a converter of 12 bits
+        assert_eq!(rows_held(&commands(&|i| (swing(i) * 4096.0).round() / 4096.0)), None);
+        let (mut r, mut warnings) = (recorded(), Vec::new());
+        let rows = r.t_s.len();
+        r.vas_v = Some((0..rows).map(|i| swing(i / 4 * 4)).collect());
+        r.vqc_v = Some((0..rows).map(swing).collect());
+        without_held_commands(&mut r, &mut warnings);
+        assert!(r.vas_v.is_none() && r.vqc_v.is_none() && warnings[0].contains("vas_v is written anew every 4 rows"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::data::plausibility::{without_dead_command, without_held_commands};
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
@@ -48,7 +49,7 @@ pub(crate) struct Dataset {
     pub(crate) tracks: Vec<Prepared>,
     pub(crate) start: Hypothesis,
     pub(crate) ring_down_runs: Vec<crate::recording::Run>,
-    /// files of those that are of another instrument
+    /// files of those that are of another instrument, or without their command
     pub(crate) ring_downs_left_out: Vec<String>,
     pub(crate) warnings: Vec<String>,
     /// effects as text, which compete with the library's
@@ -76,11 +77,24 @@ impl Dataset {
         let instrument = campaign.instrument;
         let default_period = if instrument == Instrument::Sensor { 360.0 } else { 180.0 };
         let period_rad = campaign.period_deg.unwrap_or(default_period).to_radians();
-        let (rotations, ring_down_runs): (Vec<_>, Vec<_>) =
+        let (mut rotations, ring_downs): (Vec<_>, Vec<_>) =
             campaign.runs.into_iter().partition(|r| r.kind == RunKind::Rotation);
         let mut warnings: Vec<String> = Vec::new();
-        for r in rotations.iter().chain(&ring_down_runs) {
+        for r in rotations.iter().chain(&ring_downs) {
             warnings.extend(r.recording.warnings.iter().cloned());
+        }
+        for run in &mut rotations {
+            without_dead_command(&mut run.recording, &mut warnings);
+            without_held_commands(&mut run.recording, &mut warnings);
+        }
+        // a ring-down tells nothing without its command
+        let (mut ring_down_runs, mut ring_downs_left_out) = (Vec::new(), Vec::new());
+        for mut run in ring_downs {
+            if without_dead_command(&mut run.recording, &mut warnings) {
+                ring_downs_left_out.push(run.file.display().to_string());
+            } else {
+                ring_down_runs.push(run);
+            }
         }
         let mut screen = Screen::new(stated(&campaign.angular_gain)?, rotations.len());
         let sound = screen.mended(rotations, &mut warnings)?;
@@ -126,7 +140,7 @@ impl Dataset {
             tracks: prepared,
             start,
             ring_down_runs,
-            ring_downs_left_out: Vec::new(),
+            ring_downs_left_out,
             warnings,
             written: Vec::new(),
             energy_balance: None,

@@ -69,9 +69,6 @@ impl Stepping {
     }
 }
 
-/// So many samples in a row are no spikes: the prediction is off, and would be lost for good without its integrals.
-const MOST_PASSED_OVER: usize = 3;
-
 /// Walks `segment` and hands each row to `take`.
 pub(crate) fn propagate(
     track: &Track,
@@ -82,94 +79,154 @@ pub(crate) fn propagate(
     stepping: Stepping,
     mut take: impl FnMut(&Row<'_>),
 ) {
-    let stride = stepping.stride;
     let n = unknowns.all.len();
     let predictor = Predictor::new(hypothesis, unknowns);
     let mut vibration = Vibration::new();
-    // integrals of θ̇ and ȧ/a: [the hypothesis itself, then per unknown]
-    let mut integrals = Integrals::new(2 * (n + 1));
-    let mut held = Held::default();
-    // for each group of lanes; the value is that of all
-    let mut excess = vec![Jet::constant(0.0); unknowns.input.len()];
-    // what the input effects added before the segment: the table's angle is 0 where the recording starts
-    let mut ahead = 0.0;
-    let mut integrands = vec![0.0; 2 * (n + 1)];
+    let mut excess = Excess::before(track, segment, &predictor, unknowns, stepping.stride);
+    let mut travelled = Travelled::new(n);
     let (mut angle_slopes, mut amplitude_slopes) = (vec![0.0; n], vec![0.0; n]);
     let sense = hypothesis.sense();
-    let harmonic = hypothesis.input_harmonic();
     let moment = if hypothesis.reads_commands() { Track::moment } else { Track::instant };
     let zero_input = track.input_rad[segment.range.start];
-    if harmonic > 0.0 {
-        let before: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
-        for step in before.windows(2) {
-            ahead += excess_angle(track, (step[0], ahead), step[1], (&predictor, 0), harmonic).value;
-        }
-    }
-    let mut last: Option<usize> = None;
-    let mut passed_over = 0;
-    for i in segment.range.clone().step_by(stride) {
-        let rate = track.rate(i);
-        let at = moment(track, i, hypothesis.precession(rate));
-        predictor.predict(track.envelope(i), track.commands(i, stride), &at, &mut vibration);
-        if hypothesis.instrument == Instrument::Gyroscope {
-            integrands[0] = vibration.theta_rate;
-            integrands[n + 1] = vibration.growth;
-            for (u, s) in vibration.slopes.iter().enumerate() {
-                integrands[1 + u] = s[quantity::THETA_RATE];
-                integrands[n + 2 + u] = s[quantity::GROWTH];
-            }
-        }
-        if let Some(from) = last.filter(|_| harmonic > 0.0) {
-            for (lanes, excess) in excess.iter_mut().enumerate() {
-                let before = (from, ahead + excess.value);
-                *excess = *excess + excess_angle(track, before, i, (&predictor, lanes), harmonic);
-            }
-        }
-        last = Some(i);
+    for i in segment.range.clone().step_by(stepping.stride) {
+        let at = moment(track, i, hypothesis.precession(track.rate(i)));
+        predictor.predict(track.envelope(i), track.commands(i, stepping.stride), &at, &mut vibration);
+        excess.extend_to(track, i);
         let turned = track.input_rad[i] - zero_input;
-        let input = turned + excess.first().map_or(0.0, |excess| excess.value);
+        let input = turned + excess.angle();
         let along = start.angle
             + start.drift * (track.t_s[i] - track.t_s[segment.range.start])
             + sense * hypothesis.angular_gain * input;
-        let precessed = integrals.reaching(track.t_s[i], vibration.theta_rate);
-        let off = wrapped(vibration.theta - along - precessed, hypothesis.period_rad);
         if hypothesis.instrument == Instrument::Gyroscope {
-            let believed = off.abs() <= stepping.spike || integrals.known == 0 || passed_over == MOST_PASSED_OVER;
-            passed_over = if believed { 0 } else { passed_over + 1 };
-            if believed {
-                integrals.extend_to(track.t_s[i], &integrands);
-                if !track.has_commands() {
-                    held.extend_to(&vibration, &mut integrals.sum);
-                }
-            }
+            let precessed = travelled.integrals.reaching(track.t_s[i], vibration.theta_rate);
+            let off = wrapped(vibration.theta - along - precessed, hypothesis.period_rad);
+            travelled.extend_to(track, i, &vibration, off.abs() <= stepping.spike);
         }
-        let predicted = along + integrals.sum[0];
-        let ln_a = start.amplitude + integrals.sum[n + 1];
+        let [of_angle, of_amplitude] = travelled.sums();
         for (u, s) in vibration.slopes.iter().enumerate() {
-            angle_slopes[u] = integrals.sum[1 + u] - s[quantity::THETA];
-            amplitude_slopes[u] = integrals.sum[n + 2 + u] - s[quantity::LN_AMPLITUDE];
+            angle_slopes[u] = of_angle[1 + u] - s[quantity::THETA];
+            amplitude_slopes[u] = of_amplitude[1 + u] - s[quantity::LN_AMPLITUDE];
         }
         if let Some(k) = unknowns.angular_gain {
             angle_slopes[k] = sense * input;
         }
-        for (lanes, excess) in unknowns.input.iter().zip(&excess) {
-            for (lane, &u) in lanes.columns.iter().enumerate() {
-                angle_slopes[u] = sense * hypothesis.angular_gain * excess.slope[lane];
-            }
-        }
+        excess.slopes(sense * hypothesis.angular_gain, &mut angle_slopes);
         take(&Row {
             index: i,
             turned,
             precession: at.precession_rad_s,
             vibration: vibration.envelope,
-            drift: integrals.sum[0],
-            angle: wrapped(vibration.theta - predicted, hypothesis.period_rad),
+            drift: of_angle[0],
+            angle: wrapped(vibration.theta - (along + of_angle[0]), hypothesis.period_rad),
             ln_amplitude: vibration.ln_amplitude,
             growth: vibration.growth,
-            amplitude: vibration.ln_amplitude - ln_a,
+            amplitude: vibration.ln_amplitude - (start.amplitude + of_amplitude[0]),
             angle_slopes: &angle_slopes,
             amplitude_slopes: &amplitude_slopes,
         });
+    }
+}
+
+/// So many samples in a row are no spikes: the prediction is off, and would be lost for good without its integrals.
+const MOST_PASSED_OVER: usize = 3;
+
+/// What the mechanics and the commands did since the start of a segment: the integrals of θ̇ and of ȧ/a, each of the hypothesis
+/// itself and then per unknown.
+struct Travelled {
+    integrals: Integrals,
+    integrands: Vec<f64>,
+    held: Held,
+    passed_over: usize,
+}
+
+impl Travelled {
+    /// Nothing yet, for `n` unknowns.
+    fn new(n: usize) -> Self {
+        let size = 2 * (n + 1);
+        Self { integrals: Integrals::new(size), integrands: vec![0.0; size], held: Held::default(), passed_over: 0 }
+    }
+
+    /// Adds the step to sample `i`, unless it is a spike.
+    fn extend_to(&mut self, track: &Track, i: usize, vibration: &Vibration, is_near: bool) {
+        let believed = is_near || self.integrals.known == 0 || self.passed_over == MOST_PASSED_OVER;
+        self.passed_over = if believed { 0 } else { self.passed_over + 1 };
+        if !believed {
+            return;
+        }
+        let middle = self.integrands.len() / 2;
+        let (of_angle, of_amplitude) = self.integrands.split_at_mut(middle);
+        (of_angle[0], of_amplitude[0]) = (vibration.theta_rate, vibration.growth);
+        for ((angle, amplitude), s) in of_angle[1..].iter_mut().zip(&mut of_amplitude[1..]).zip(&vibration.slopes) {
+            (*angle, *amplitude) = (s[quantity::THETA_RATE], s[quantity::GROWTH]);
+        }
+        self.integrals.extend_to(track.t_s[i], &self.integrands);
+        if !track.has_commands() {
+            self.held.extend_to(vibration, &mut self.integrals.sum);
+        }
+    }
+
+    /// The integrals of θ̇, rad, and of ȧ/a.
+    fn sums(&self) -> [&[f64]; 2] {
+        self.integrals.sum.split_at(self.integrals.sum.len() / 2).into()
+    }
+}
+
+/// What the input effects add to the input angle along a segment.
+struct Excess<'a> {
+    predictor: &'a Predictor<'a>,
+    unknowns: &'a Unknowns,
+    /// harmonic of the table that they go by; 0 where there are none
+    harmonic: f64,
+    /// what they added before the segment, rad: the table's angle is 0 where the recording starts
+    ahead: f64,
+    /// since then, for each group of lanes; the value is that of all
+    lanes: Vec<Jet>,
+    last: Option<usize>,
+}
+
+impl<'a> Excess<'a> {
+    /// Before the first sample of `segment`.
+    fn before(
+        track: &Track,
+        segment: &Segment,
+        predictor: &'a Predictor<'a>,
+        unknowns: &'a Unknowns,
+        stride: usize,
+    ) -> Self {
+        let harmonic = predictor.hypothesis.input_harmonic();
+        let mut ahead = 0.0;
+        if harmonic > 0.0 {
+            let rows: Vec<usize> = (0..segment.range.start).step_by(stride).chain([segment.range.start]).collect();
+            for step in rows.windows(2) {
+                ahead += excess_angle(track, (step[0], ahead), step[1], (predictor, 0), harmonic).value;
+            }
+        }
+        Self { predictor, unknowns, harmonic, ahead, lanes: vec![Jet::constant(0.0); unknowns.input.len()], last: None }
+    }
+
+    /// Adds the step to sample `i`.
+    fn extend_to(&mut self, track: &Track, i: usize) {
+        if let Some(from) = self.last.filter(|_| self.harmonic > 0.0) {
+            for (lanes, excess) in self.lanes.iter_mut().enumerate() {
+                let before = (from, self.ahead + excess.value);
+                *excess = *excess + excess_angle(track, before, i, (self.predictor, lanes), self.harmonic);
+            }
+        }
+        self.last = Some(i);
+    }
+
+    /// Input angle since the start of the segment, rad.
+    fn angle(&self) -> f64 {
+        self.lanes.first().map_or(0.0, |excess| excess.value)
+    }
+
+    /// Puts the slopes of the angle, `by` for a unit of the input's, where they belong.
+    fn slopes(&self, by: f64, angle_slopes: &mut [f64]) {
+        for (lanes, excess) in self.unknowns.input.iter().zip(&self.lanes) {
+            for (lane, &u) in lanes.columns.iter().enumerate() {
+                angle_slopes[u] = by * excess.slope[lane];
+            }
+        }
     }
 }
 
