@@ -36,6 +36,34 @@ fn a_cycle_lasts_ten_to_a_hundred_milliseconds() {
     }
 }
 
+/// Every parameter by itself, in the order in which they stand: what is expected of it, and what it may wander in a root second.
+#[test]
+fn what_is_expected_of_a_device_and_what_may_wander() {
+    let table = [
+        (1e-3, 2e-7),
+        (1e-3, 2e-7),
+        (7.5e-3, 1e-6),
+        (0.1, 1e-5),
+        (0.04, 1.2e-5),
+        (8e-3, 1.2e-5),
+        (8e-3, 2e-6),
+        (0.02, 1e-6),
+        (0.01, 1e-6),
+        (0.1, 3e-6),
+        (0.01, 1e-6),
+        (0.01, 1e-6),
+        (2.0, 3e-5),
+        (2.0, 3e-5),
+        (0.1, 1e-6),
+        (0.02, 3e-6),
+        (0.01, 1e-6),
+        (0.03, 1.2e-5),
+        (6e-3, 1.2e-5),
+    ];
+    assert_eq!(Parameter::ALL.map(|p| (p.expected::<f64>(), p.wander::<f64>())), table);
+    assert_eq!(Parameter::ALL.map(|p| p as usize), core::array::from_fn(|j| j));
+}
+
 /// One parameter moved by a value in its own unit.
 fn unit(p: Parameter, value: f64) -> Vector<f64> {
     let mut v = [0.0; N];

@@ -126,6 +126,15 @@ fn the_rate_loop_is_its_law_scaled_by_the_amplitude() {
     }
 }
 
+#[test]
+fn a_hold_is_realised_below_one_and_not_at_one() {
+    let tuned = |bandwidth: f64, damping: f64| {
+        RateLoop::tuned(bandwidth, damping, 1.5, 10.0, 1.0 / 2048.0, LIMIT_V).map(|_| ()).map_err(|e| e.parameter)
+    };
+    assert_eq!((tuned(1023.9, 1.0), tuned(2047.9, 0.5)), (Ok(()), Ok(())));
+    assert_eq!((tuned(1024.0, 1.0), tuned(2048.0, 0.5)), (Err("bandwidth_rad_s"), Err("bandwidth_rad_s")));
+}
+
 /// The angle error is that of the axes: an ellipse is held as a line of its energy.
 #[test]
 fn an_ellipse_is_held_as_a_line_of_its_energy() {

@@ -29,10 +29,8 @@ fn what_is_in_force_is_bounded<T: Float + Arbitrary>(share: f64) {
     kani::cover!(made.is_none(), "refused");
     if let Some(c) = made {
         kani::cover!(c.known.iter().any(|v| *v < T::zero()), "a value below none");
-        for p in Parameter::ALL {
-            kani::cover!(true, "every parameter");
-            assert!(get(&c.known, p).magnitude() <= p.expected::<T>() * T::from_f64(FARTHEST * share));
-        }
+        let within = |p: &Parameter| get(&c.known, *p).magnitude() <= p.expected::<T>() * T::from_f64(FARTHEST * share);
+        assert!(Parameter::ALL.iter().all(within));
         let near = |z: Complex<T>, re: T, reach: f64| {
             (z.re - re).magnitude() <= T::from_f64(reach * share) && z.im.magnitude() <= T::from_f64(reach * share)
         };

@@ -271,6 +271,27 @@ fn a_detection_of_no_device_is_forgotten_and_the_mechanics_in_force_are_kept() {
     }
 }
 
+/// The symmetry of the split is a measurement of a ten-thousandth, and less with each use: it is taken where it tells more than
+/// that, and where what it tells is no further off than four deviations.
+#[test]
+fn a_symmetry_is_used_where_it_tells_more_than_its_noise() {
+    for (used, noise) in [(0_u16, 1e-8), (1, 2e-8), (3, 4e-8)] {
+        let weighed = |spread: f64, deviations: f64| {
+            let mut s = due(4);
+            s.schedule.accept = true;
+            s.schedule.uses_of_symmetry = used;
+            s.filter.spread = spread * noise;
+            s.score = deviations * f64::sqrt((spread + 1.0) * noise);
+            calibrator().commit_slice(&mut s, 6);
+            (s.schedule.accept, s.schedule.uses_of_symmetry)
+        };
+        assert_eq!((weighed(3.99, 0.0), weighed(4.01, 0.0)), ((false, used), (true, used + 1)));
+        for sign in [1.0, -1.0] {
+            assert_eq!((weighed(9.0, sign * 3.99), weighed(9.0, sign * 4.01)), ((true, used + 1), (false, used)));
+        }
+    }
+}
+
 #[test]
 fn a_split_is_symmetric_and_what_is_not_is_the_detections() {
     let mut before = due(4);

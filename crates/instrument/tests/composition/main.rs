@@ -150,6 +150,15 @@ fn a_start_from_silence_sweeps_and_ends_in_a_fault() {
     in_both_precisions(&[Event::Silent(2400)], &[Mode::Sweep, Mode::Listen, Mode::Fault]);
 }
 
+/// After a sweep that drives both, one that carries nothing is dead, whichever it is.
+#[test]
+fn a_channel_that_is_dead_from_the_start() {
+    for channel in [0, 1] {
+        let script = [Event::Silent(300), Event::Constant(channel, 0.0, 2400)];
+        in_both_precisions(&script, &[Mode::Sweep, Mode::Listen, Mode::Fault]);
+    }
+}
+
 #[test]
 fn a_vibration_beside_the_band_is_followed_as_far_as_the_band_goes() {
     for detuned_hz in [430.0, -430.0, 700.0, -700.0] {
