@@ -92,6 +92,22 @@ fn a_decay_that_is_not_exponential_is_named_and_its_interval_covers_it() {
     }
 }
 
+/// At speed the quadrature loop leaves an ellipse as well, and the rotations take 30 % more energy command for what holds a
+/// split of 0.26 Hz.
+#[test]
+fn a_sound_ring_down_beside_a_large_split_is_of_the_same_device() {
+    let mut draw = Draws::new(11_000);
+    let (ratio, split) = (draw.between(0.97, 1.03), draw.scale(0.1, 0.4));
+    let effects = vec![
+        polar(EffectId::Anisodamping, draw.between(0.0, 0.008), draw.angle_deg(), 2.0),
+        polar(EffectId::Anisoelasticity, std::f64::consts::TAU * split, draw.angle_deg(), 2.0),
+        effect(EffectId::ActuationGainMismatch, &[draw.between(0.97, 1.03)]),
+        effect(EffectId::DetectionGainMismatch, &[ratio]),
+    ];
+    let report = identified(recorded(Settings { seed: 0, effects, ..plain_paper() })).unwrap().report;
+    assert!(report.runs.iter().all(|r| r.r#use != "left out"), "{:?}", report.warnings);
+}
+
 /// A recording that begins after the energy loop was switched off holds a decay and no command.
 #[test]
 fn a_ring_down_without_its_beginning_is_refused() {

@@ -91,15 +91,19 @@ impl Dataset {
         self.ring_down_runs.iter().map(|r| ring_down(r, hypothesis)).collect()
     }
 
-    /// The mean of −v_as/a over the directions, 1/1, of the usual rotation; `None` where it was not recorded.
+    /// The mean of −v_as/a over the directions, 1/1, of the usual rotation, less what v_qc does of it; `None` where it was not
+    /// recorded.
     fn usual_drive(&self, hypothesis: &Hypothesis) -> Option<f64> {
         let fitted = self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0);
         let means = fitted.filter(|t| t.has_commands() && t.has_amplitude()).filter_map(|t| {
             let stride = (t.t_s.len() / LOOKED_AT).max(1);
             let rows = t.segments.iter().flat_map(|s| s.range.clone()).step_by(stride);
             let taken = rows.filter_map(|i| {
-                let a = hypothesis.unread(t.envelope(i), &t.moment(i, 0.0)).pendulum().e.sqrt();
-                t.commands(i, stride).map(|v| -v.now.v_as / a).filter(|d| d.is_finite())
+                let p = hypothesis.unread(t.envelope(i), &t.moment(i, 0.0)).pendulum();
+                let v = t.commands(i, stride)?.now;
+                // what holds a split works on the ellipse that a quadrature loop of finite bandwidth leaves
+                let work = 0.5 * v.v_qc * p.q / p.e.powf(1.5);
+                Some(work - v.v_as / p.e.sqrt()).filter(|d| d.is_finite())
             });
             let (sum, n) = taken.fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
             (n > 0.0).then(|| sum / n)
