@@ -33,12 +33,17 @@ const OF_ELECTRONICS: [EffectId; 5] = [
     EffectId::DetectionQuintic,
     EffectId::ActuationPhase,
 ];
+/// What the drives can't put out, on [`DRIVEN`].
+const OF_DRIVES: [EffectId; 1] = [EffectId::DriveSaturation];
 /// How many effects a campaign gets: none in one of six, two in two of six.
 const COUNTS: [usize; 6] = [0, 1, 1, 1, 2, 2];
 /// rms of the drawn signature over the noise floor of the held-out angle.
 const SIGNATURE: [f64; 2] = [2.0, 50.0];
 /// The largest skew of a drive that is drawn, whatever its signature is.
 const LARGEST_ACTUATION_SKEW: f64 = 0.3;
+
+/// Drives are asked for so many per cent more than their level at most: beyond 4/π of it no command gets what is asked for.
+const LARGEST_OVERDRIVE: f64 = 25.0;
 
 /// What campaigns are drawn from.
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +59,9 @@ pub const BALANCED: Bench = Bench { split_hz: [0.0, 0.05], first: &[] };
 /// A device with a split that makes the commands go with the angle, at temperatures that differ from run to run.
 pub const ELECTRONICS: Bench = Bench { split_hz: [0.05, 0.4], first: &OF_ELECTRONICS };
 
+/// A device like that whose drives can't put out what it asks for.
+pub const DRIVEN: Bench = Bench { split_hz: [0.05, 0.4], first: &OF_DRIVES };
+
 /// Shape of an undeclared effect: everything but its size.
 struct Shape {
     id: EffectId,
@@ -61,7 +69,8 @@ struct Shape {
     sign: f64,
     table_harmonic: f64,
     frequency_hz: f64,
-    largest_readout_v: f64,
+    /// of what may saturate, the readout or a drive
+    largest_v: f64,
     /// shares of the four factors of a feed-through
     shares: [f64; 4],
 }
@@ -75,7 +84,9 @@ impl Shape {
             EffectId::TableHarmonic => effect(self.id, &[self.table_harmonic, size * cos, size * sin]),
             EffectId::TimePeriodic => effect(self.id, &[self.frequency_hz, size * cos, size * sin]),
             EffectId::DriveFeedthrough => effect(self.id, &self.shares.map(|share| size * share)),
-            EffectId::DetectionSaturation => effect(self.id, &[(1.0 + size) / self.largest_readout_v]),
+            EffectId::DetectionSaturation | EffectId::DriveSaturation => {
+                effect(self.id, &[(1.0 + size) / self.largest_v])
+            }
             _ => effect(self.id, &[self.sign * size]),
         }
     }
@@ -92,7 +103,8 @@ pub struct Drawn {
 
 impl Drawn {
     /// The size that counts: what the effect leaves beside the declared model; the drive's skew, which the declared
-    /// model takes up whole in the angle, as such.
+    /// model takes up whole in the angle, as such; of drives that clip, which the angle hardly shows, by how many per cent the
+    /// largest command is over the level.
     pub fn size(&self) -> f64 {
         self.signature[judged_by(self.effect.id)]
     }
@@ -168,18 +180,29 @@ pub fn setup(bench: &Bench, seed: u64) -> Setup {
     for _ in 0..COUNTS[draw.below(COUNTS.len())] {
         let ratio = draw.scale(SIGNATURE[0], SIGNATURE[1]);
         let from = if first.is_empty() { &mut ids } else { &mut first };
+        let id = from.swap_remove(draw.below(from.len()));
         let shape = Shape {
-            id: from.swap_remove(draw.below(from.len())),
+            id,
             direction_deg: draw.angle_deg(),
             sign: if draw.below(2) == 0 { 1.0 } else { -1.0 },
             table_harmonic: 1.0 + draw.below(4) as f64,
             frequency_hz: draw.scale(0.3, 30.0),
-            largest_readout_v: settings.amplitude_v * detection.max(1.0),
+            largest_v: if id == EffectId::DriveSaturation {
+                largest_drive(&settings)
+            } else {
+                settings.amplitude_v * detection.max(1.0)
+            },
             shares: if bench.first.is_empty() { [0.0; 4] } else { std::array::from_fn(|_| draw.between(-1.0, 1.0)) },
         };
         first.clear();
-        let effect = of_signature(&settings, &shape, ratio);
-        drawn.push(Drawn { effect, signature: signature(&settings, &recorded(&settings, None), effect) });
+        let (effect, signature) = if id == EffectId::DriveSaturation {
+            let over = ratio.min(LARGEST_OVERDRIVE);
+            (shape.sized(0.01 * over), [over; 2])
+        } else {
+            let effect = of_signature(&settings, &shape, ratio);
+            (effect, signature(&settings, &recorded(&settings, None), effect))
+        };
+        drawn.push(Drawn { effect, signature });
         settings.effects.push(effect);
     }
     Setup { settings, drawn }
@@ -207,6 +230,25 @@ fn of_signature(settings: &Settings, shape: &Shape, ratio: f64) -> EffectSetting
         }
     }
     shape.sized(size)
+}
+
+/// The largest voltage that any drive is commanded to in a rotation of a device that gets it.
+pub fn largest_drive(settings: &Settings) -> f64 {
+    let settings = Settings { noise_v: 0.0, ..settings.clone() };
+    let runs = scenario(settings).simulate().runs;
+    let of = |simulated: &SimulatedRun| {
+        let Run::Rotation { settle_s, .. } = &simulated.run else { return 0.0 };
+        let column = |name| simulated.column(name).expect("a column of a rotation run");
+        let [t, xc, xs, yc, ys] = ["t_s", "xc_v", "xs_v", "yc_v", "ys_v"].map(column);
+        let [v_as, v_qc] = ["vas_v", "vqc_v"].map(column);
+        let rows = (0..t.len()).filter(|&i| t[i] >= *settle_s).map(|i| {
+            let (sin, cos) = Envelope::new(xc[i], xs[i], yc[i], ys[i]).pendulum().angle().sin_cos();
+            let (x, y) = ((v_as[i] * cos).hypot(v_qc[i] * sin), (v_as[i] * sin).hypot(v_qc[i] * cos));
+            x.max(y)
+        });
+        rows.fold(0.0, f64::max)
+    };
+    runs.iter().map(of).fold(0.0, f64::max)
 }
 
 /// A noiseless rotation run: its purpose, and time, pattern angle and precession per deg/s of its settled rows.

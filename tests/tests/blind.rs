@@ -11,13 +11,14 @@ use cvg_calibration::{Identification, Origin};
 use cvg_model::effects::{EffectId, Shown, Values};
 use cvg_simulator::Settings;
 use cvg_tests::bench::{Coloured, Draws, all, found, holds, identify, over_floor, trials};
-use cvg_tests::blind::{BALANCED, Bench, Drawn, ELECTRONICS, Setup, setup};
+use cvg_tests::blind::{BALANCED, Bench, DRIVEN, Drawn, ELECTRONICS, Setup, setup};
 use cvg_tests::domain::wrapped;
 
 /// Trials without `CVG_TRIALS`, under white and under coloured noise, and of what only a split or a thermometer tells.
 const TRIALS: u64 = 24;
 const COLOURED_TRIALS: u64 = 8;
 const ELECTRONICS_TRIALS: u64 = 8;
+const DRIVEN_TRIALS: u64 = 4;
 /// From this signature on, over the noise floor, an effect has to be named.
 const NAMED_ABOVE: f64 = 5.0;
 /// Shares of what has to come out, and the chance that a finder which just reaches them fails the trial.
@@ -252,6 +253,12 @@ fn hidden_effects_are_named_and_none_is_named_where_none_is() {
 #[test]
 fn what_the_electronics_add_is_named_as_well() {
     blind(&all(trials(ELECTRONICS_TRIALS), |seed| outcome(&ELECTRONICS, 20_000 + seed, None)));
+}
+
+/// Drives that can't put out what a split asks of them.
+#[test]
+fn drives_that_saturate_are_named_as_well() {
+    blind(&all(trials(DRIVEN_TRIALS), |seed| outcome(&DRIVEN, 30_000 + seed, None)));
 }
 
 /// Neither of two causes that nearly cancel in the angle lowers the error alone: an actuation skew and a detection skew, a

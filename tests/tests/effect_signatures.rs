@@ -51,6 +51,30 @@ fn precessions() -> impl Strategy<Value = f64> {
     (0.1..10.0_f64, any::<bool>()).prop_map(|(rate, back)| if back { -rate } else { rate })
 }
 
+/// Output over input of a carrier of `n` steps through a converter that rounds, by its first harmonic.
+fn rounded_gain(n: f64) -> f64 {
+    let rows = (1..).map(|i| f64::from(i) - 0.5).take_while(|level| *level < n);
+    4.0 / (PI * n) * rows.map(|level| (1.0 - (level / n).powi(2)).sqrt()).sum::<f64>()
+}
+
+#[test]
+fn the_steps_of_a_drives_converter_leave_its_carrier_as_it_is() {
+    // the formula, beside a converter that rounds
+    let (n, samples) = (9.3, 1 << 20);
+    let first: f64 =
+        (0..samples).map(|i| (TAU * f64::from(i) / f64::from(samples)).sin()).map(|s| (n * s).round() * s).sum();
+    assert!((2.0 * first / (n * f64::from(samples)) - rounded_gain(n)).abs() < 1e-5);
+    // an angle of (N_y - N_x)/(2 tau k Omega) at most, N - 1 of either sign
+    let mdeg = |n: f64| (0.4 * n.powf(-1.5) / (2.0 * 22.0 * 0.78 * 60.0_f64.to_radians())).to_degrees() * 1e3;
+    for least in [4.0, 16.0, 128.0, 512.0, 2047.0] {
+        let off = (0..3000)
+            .map(|i| least * (1.0 + f64::from(i) / 6000.0))
+            .map(|n| (rounded_gain(n) - 1.0).abs() * n.powf(1.5));
+        assert!(off.fold(0.0, f64::max) < 0.4, "{least}");
+    }
+    assert!((mdeg(128.0) - 0.44).abs() < 0.005 && (mdeg(512.0) - 0.055).abs() < 5e-4);
+}
+
 proptest! {
     #![proptest_config(cvg_tests::config())]
 
@@ -249,6 +273,39 @@ proptest! {
         let f = EffectId::ActuationPhase.actuate(&values(&[phase]), commanded).along_orbit(theta);
         prop_assert_near!(f.q_s, -phase * held, 1e-9);
         prop_assert_near!(f.a_s, 0.0, 1e-14);
+    }
+
+    /// Below the level nothing is lost; above it each axis by itself, the more the nearer the pattern lies to it.
+    #[test]
+    fn prop_a_drive_that_saturates_loses_at_multiples_of_90_degrees(
+        level in 0.1..10.0_f64, over in 1.0..1.4_f64, theta in angles(),
+    ) {
+        let v = values(&[1.0 / level]);
+        let gain = |share: f64| {
+            let r = (1.0 / (over * share.abs())).min(1.0);
+            2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt())
+        };
+        let (sin, cos) = theta.sin_cos();
+        let (x, y) = (gain(cos), gain(sin));
+        let f = driven(EffectId::DriveSaturation, &v, over * level, theta);
+        prop_assert_near!(f.a_s / (over * level), x * cos * cos + y * sin * sin, 1e-12);
+        prop_assert_near!(f.q_s / (over * level), 0.5 * (y - x) * (2.0 * theta).sin(), 1e-12);
+        // a command of less than the level, and one that both axes share
+        let whole = driven(EffectId::DriveSaturation, &v, 0.999 * level, theta);
+        prop_assert_near!(whole.a_s, 0.999 * level, 1e-12 * level);
+        let between = driven(EffectId::DriveSaturation, &v, over * level, core::f64::consts::FRAC_PI_4);
+        prop_assert_near!(between.a_s, over * level, 1e-12 * level);
+    }
+
+    /// What holds the quadrature saturates with what holds the amplitude: both phases of one axis are one voltage.
+    #[test]
+    fn prop_both_phases_of_a_drive_saturate_together(over in 1.1..3.0_f64, phase in angles()) {
+        let (sin, cos) = phase.sin_cos();
+        let f = cvg_model::AxisForces { x_c: over * cos, x_s: over * sin, y_c: 0.0, y_s: 0.0 };
+        let out = EffectId::DriveSaturation.actuate(&values(&[1.0]), f);
+        let r = 1.0 / over;
+        prop_assert_near!(out.x_c.hypot(out.x_s), over * 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt()), 1e-12);
+        prop_assert_near!(out.x_c * f.x_s - out.x_s * f.x_c, 0.0, 1e-12);
     }
 
     /// θ̇ = −kΩ0(1 + w cos(nα + phase)) with α̇ = Ω0 integrates to −(kw/n) sin(nα + phase).

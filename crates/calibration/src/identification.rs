@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use crate::angle_sensor::{self, curve::Curve};
 use crate::carrier;
 use crate::data::copies::without_copies;
+use crate::diagnostics::drives::drives_that_saturate;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::{PlotContext, PlotData};
@@ -178,7 +179,8 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let warnings = std::mem::take(&mut dataset.warnings);
-    let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors };
+    let drives = options.discover.then(|| drives_that_saturate(&dataset, &fitted.fit)).flatten();
+    let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors, drives };
     found.report(head, warnings, with_plots)
 }
 
@@ -255,6 +257,8 @@ struct Found {
     steps: Vec<Step>,
     scale_factor: Option<ScaleFactor>,
     errors: Errors,
+    /// drives that clip, which the commands tell and the angle does not
+    drives: Option<EffectReport>,
 }
 
 impl Found {
@@ -266,7 +270,8 @@ impl Found {
         let own_ratios = self.context(&[]).own_detection_ratios();
         let detection_gain_ratio = inference.detection_ratio(&own_ratios, &mut warnings);
         let actuation_gain_ratio = inference.actuation_ratio(detection_gain_ratio, &mut warnings);
-        let effects = inference.effects(&self.steps, &errors.discovered);
+        let mut effects = inference.effects(&self.steps, &errors.discovered);
+        effects.extend(self.drives.clone());
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);
         let plots = with_plots.then(|| {

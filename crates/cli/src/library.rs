@@ -167,7 +167,8 @@ At one rate and one amplitude the following cannot be told apart:
 - `detection-gain-mismatch`, and the sine part of `anisodamping`;
 - `detection-skew`, and the cosine part of `anisodamping`;
 - `detection-cubic`, and `spring-cubic`;
-- the difference part of `detection-cubic`, and `detection-gain-mismatch`.
+- the difference part of `detection-cubic`, and `detection-gain-mismatch`;
+- `drive-saturation`, and `spring-cubic`, where the commands were not recorded.
 
 What separates them is in [Prepare a campaign](campaigns.md). How an effect is added is in
 [Add an effect](adding-an-effect.md).

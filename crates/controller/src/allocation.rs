@@ -34,8 +34,9 @@ impl<T: Float> ActuationCompensation<T> {
     /// The inverse of the actuation `effects` of the library, which act in the order of [`EffectId::ALL`].
     ///
     /// # Errors
-    /// An effect that does not act on the forces, a parameter that is not finite or outside its bounds, or drives
-    /// that cannot push in every direction (determinant below a thousandth).
+    /// An effect that does not act on the forces, one that limits them (`limit_v` below its level is what answers it), a
+    /// parameter that is not finite or outside its bounds, or drives that cannot push in every direction (determinant
+    /// below a thousandth).
     pub fn new(effects: &[(EffectId, Values<T>)]) -> Result<Self, ConfigError> {
         for (id, values) in effects {
             check(*id, values)?;
@@ -193,6 +194,12 @@ fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> 
     let description = id.description();
     if description.stage != Stage::Actuation || !id.in_library() {
         return Err(ConfigError { parameter: description.id, expected: "an effect of the actuation" });
+    }
+    if id.limits_drives() && *values != id.neutral() {
+        return Err(ConfigError {
+            parameter: description.id,
+            expected: "in proportion: `limit_v` below its level instead",
+        });
     }
     for (value, parameter) in values.iter().zip(description.parameters) {
         let v = value.to_f64();

@@ -27,6 +27,15 @@ fn drives_that_cannot_push_in_every_direction_are_refused() {
 }
 
 #[test]
+fn drives_that_saturate_are_no_matrix_to_be_inverted() {
+    let new = |inverse_level: f64| {
+        let effects = [(EffectId::DriveSaturation, [inverse_level, 0.0, 0.0, 0.0])];
+        ActuationCompensation::new(&effects).map(|_| ()).map_err(|e| e.parameter)
+    };
+    assert_eq!((new(0.0), new(0.1)), (Ok(()), Err("drive-saturation")));
+}
+
+#[test]
 fn the_rate_loop_brings_the_pattern_to_its_heading_and_holds_it_against_a_drift() {
     let (b, period) = (1.5, 5e-4);
     let rate = RateLoop::tuned(12.0, 1.0, b, 10.0, period, LIMIT_V).expect("valid");

@@ -29,7 +29,9 @@ fn values(id: EffectId) -> Vec<Values<f64>> {
             [0.02, -0.06, 0.0, 0.0],
         ],
         EffectId::DriveFeedthrough => &[[0.3, -0.2, -0.1, 0.4], [0.0, 0.0, 0.2, -0.3]],
-        EffectId::DetectionSaturation => &[[0.0; 4], [0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.3, 0.0, 0.0, 0.0]],
+        EffectId::DetectionSaturation | EffectId::DriveSaturation => {
+            &[[0.0; 4], [0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.3, 0.0, 0.0, 0.0]]
+        }
         _ => &[[0.0; 4], [0.3, -0.2, 0.0, 0.0], [-0.1, 0.4, 0.0, 0.0]],
     };
     all.to_vec()

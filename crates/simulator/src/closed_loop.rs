@@ -358,6 +358,12 @@ impl ClosedLoop {
         [x_c + n.x_c, x_s + n.x_s, y_c + n.y_c, y_s + n.y_s]
     }
 
+    /// What drives that saturate put out.
+    #[inline(never)]
+    fn limited(&self, drive: AxisForces<f64>) -> AxisForces<f64> {
+        self.design.stages.limited(drive)
+    }
+
     /// The mechanics to the next sample, and the reference phase with it.
     #[inline]
     fn advance(&mut self, at: &Moment<f64>, drive: &AxisForces<f64>) {
@@ -369,6 +375,7 @@ impl ClosedLoop {
         } else {
             *drive
         };
+        let drive = if self.design.stages.limiting.is_empty() { drive } else { self.limited(drive) };
         let (table, input) = if self.rate_is_nominal {
             (nominal, nominal)
         } else {

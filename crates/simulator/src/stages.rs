@@ -23,8 +23,10 @@ pub struct Stages {
     pub nonlinear: Vec<Setting>,
     /// an isotropic nonlinear spring
     pub spring: Option<Spring>,
-    /// on the forces
+    /// on the forces, and in proportion to the commands
     pub actuation: Vec<Setting>,
+    /// on the forces before these, and not in proportion
+    pub limiting: Vec<Setting>,
     /// on the readout
     pub readout: Vec<Setting>,
 }
@@ -62,6 +64,7 @@ impl Stages {
                 Stage::Input => &mut stages.input,
                 Stage::Mechanics if is_linear(|e| id.mechanics(values, e)) => &mut stages.linear,
                 Stage::Mechanics => &mut stages.nonlinear,
+                Stage::Actuation if id.limits_drives() => &mut stages.limiting,
                 Stage::Actuation => &mut stages.actuation,
                 Stage::Readout => &mut stages.readout,
             };
@@ -83,7 +86,13 @@ impl Stages {
         self.table.is_empty() && self.input.is_empty()
     }
 
-    /// The forces that the drives make of the commands `f`.
+    /// What the drives put out of the commands `f`, as far as they can.
+    #[inline]
+    pub fn limited(&self, f: AxisForces<f64>) -> AxisForces<f64> {
+        self.limiting.iter().fold(f, |f, (id, v)| id.actuate(v, f))
+    }
+
+    /// The forces that the drives make of what they put out, `f`: linear.
     #[inline]
     pub fn actuate(&self, f: AxisForces<f64>) -> AxisForces<f64> {
         self.actuation.iter().fold(f, |f, (id, v)| id.actuate(v, f))

@@ -167,13 +167,29 @@ fn free_decay_and_precession_are_exact() {
 }
 
 #[test]
-fn every_actuation_effect_of_the_library_is_linear_as_the_propagation_takes_it() {
-    for id in EffectId::ALL {
+fn every_actuation_effect_that_limits_nothing_is_linear_as_the_propagation_takes_it() {
+    for id in EffectId::ALL.iter().filter(|id| !id.limits_drives()) {
         let values = [1.1, 0.05, 0.02, 0.0];
         let f = |x: f64| id.actuate(&values, AxisForces { x_c: x, x_s: -2.0 * x, y_c: 0.3 * x, y_s: x });
         assert_abs_diff_eq!(f(1.0).y_s * 3.0, f(3.0).y_s, epsilon = 1e-12);
         assert_abs_diff_eq!(f(1.0).x_c * 3.0, f(3.0).x_c, epsilon = 1e-12);
     }
+}
+
+#[test]
+fn what_limits_the_drives_stands_before_what_is_in_proportion() {
+    let stages = Stages::new(&[
+        (EffectId::ActuationGainMismatch, [4.0, 0.0, 0.0, 0.0]),
+        (EffectId::DriveSaturation, [0.5, 0.0, 0.0, 0.0]),
+    ]);
+    let of = |list: &[Setting]| list.iter().map(|(id, _)| *id).collect::<Vec<_>>();
+    assert_eq!(of(&stages.limiting), [EffectId::DriveSaturation]);
+    assert_eq!(of(&stages.actuation), [EffectId::ActuationGainMismatch]);
+    // 3 V of both are clipped at 2 V and then doubled and halved
+    let f = stages.actuate(stages.limited(AxisForces { x_c: 3.0, x_s: 0.0, y_c: 0.0, y_s: 3.0 }));
+    let n = 2.0 / core::f64::consts::PI * ((2.0_f64 / 3.0).asin() + 2.0 / 3.0 * (1.0 - 4.0_f64 / 9.0).sqrt());
+    assert_abs_diff_eq!(f.x_c, 2.0 * 3.0 * n, epsilon = 1e-12);
+    assert_abs_diff_eq!(f.y_s, 0.5 * 3.0 * n, epsilon = 1e-12);
 }
 
 proptest! {

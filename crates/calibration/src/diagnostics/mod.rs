@@ -3,6 +3,7 @@
 pub mod allan;
 pub(crate) mod at_rest;
 pub(crate) mod decomposition;
+pub(crate) mod drives;
 pub(crate) mod evaluate;
 pub(crate) mod influences;
 pub mod plots;

@@ -261,7 +261,7 @@ impl<'h> Predictor<'h> {
 
 impl<T: Real> Drive<T> {
     /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
-    /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects.
+    /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects, which are of volts.
     #[inline]
     fn rate(&self, v: &Commands, seen: &Direction<f64>, lift: impl Fn(f64) -> T) -> Envelope<T> {
         let latency = self.control_latency_s;
@@ -270,9 +270,10 @@ impl<T: Real> Drive<T> {
         let held = |now: f64, change: f64| lift(now) - latency * lift(change);
         let v =
             ControlOutputs { v_as: held(v.now.v_as, v.change_per_s.v_as), v_qc: held(v.now.v_qc, v.change_per_s.v_qc) };
-        let equal = ActuationGains { x: self.force_scale, y: self.force_scale };
-        let forces = equal.axis_forces_along(&v, cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late);
-        self.effects.iter().fold(forces, |f, (id, values)| id.actuate(values, f)).envelope_rate(T::one())
+        let equal = ActuationGains { x: T::one(), y: T::one() };
+        let volts = equal.axis_forces_along(&v, cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late);
+        let forces = self.effects.iter().fold(volts, |f, (id, values)| id.actuate(values, f));
+        forces.envelope_rate(T::one()) * self.force_scale
     }
 }
 

@@ -48,7 +48,9 @@ pub(crate) fn candidates(
         let unmeasured = id.by_temperature() && !dataset.temperature_varies();
         // a higher power of the amplitude is a lower one where there is one amplitude
         let unresolved = d.scaling.amplitude > LOWEST_POWER && dataset.alike().amplitude;
-        if d.declared || unseen || unmeasured || unresolved || (sensor && !d.in_sensors) {
+        // the angle hardly shows drives that clip: the quadrature balance tells them
+        let told_elsewhere = id.limits_drives() && id.in_library();
+        if d.declared || unseen || told_elsewhere || unmeasured || unresolved || (sensor && !d.in_sensors) {
             continue;
         }
         if d.scaling.rate > 0 && !dataset.rate_varies() {

@@ -51,7 +51,7 @@ impl Effect for DetectionSaturation {
 
 /// Output over input amplitude of a carrier that reaches `drive` times the clip level.
 #[inline]
-fn clipped_gain<T: Real>(drive: T) -> T {
+pub(super) fn clipped_gain<T: Real>(drive: T) -> T {
     if drive > T::one() {
         let r = T::one() / drive;
         let rest = (T::one() - r * r).sqrt();

@@ -25,6 +25,7 @@ pub mod detection_quintic;
 pub mod detection_saturation;
 pub mod detection_skew;
 pub mod drive_feedthrough;
+pub mod drive_saturation;
 pub mod gain_drift;
 pub mod harmonic_n;
 pub mod rate_offset;
@@ -209,7 +210,7 @@ pub struct Description {
     /// its parameters
     pub parameters: &'static [Parameter],
     /// where a fit begins when the effect has no slope at its neutral values: values of the first parameter, in units
-    /// of one over the amplitude
+    /// of one over the largest amplitude of what it acts on, a readout channel or a drive
     pub onsets: &'static [f64],
     /// how they are shown
     pub shown: &'static [Shown],
@@ -291,7 +292,7 @@ pub trait Effect: listed::Listed {
         Envelope::zero()
     }
 
-    /// The forces that result when `f` is commanded.
+    /// The forces that result when `f` is commanded, in volts of command.
     #[inline]
     fn actuate<T: Real>(_: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
         f
@@ -515,6 +516,12 @@ impl EffectId {
         true
     }
 
+    /// Whether it limits what the drives put out, so that forces are not in proportion to the commands.
+    pub fn limits_drives(self) -> bool {
+        let d = self.description();
+        d.stage == Stage::Actuation && !d.onsets.is_empty()
+    }
+
     /// Whether a readout effect is added to the angle of the vibration itself, before plates, axes, amplifier and converter.
     pub fn acts_on_angle(self) -> bool {
         self.description().stage == Stage::Readout && self < Self::DetectionCubic
@@ -536,8 +543,8 @@ impl core::fmt::Display for EffectId {
     }
 }
 
-// The list. Readout effects stand in the order in which the signal meets them: what is added to the angle of the
-// vibration itself, then plates, axes, amplifier and converter.
+// The list. Actuation and readout effects stand in the order in which the signal meets them: the drives' amplifiers, their
+// axes; what is added to the angle of the vibration itself, then plates, axes, amplifier and converter.
 library! {
     TableHarmonic => table_harmonic::TableHarmonic,
     RateOffset => rate_offset::RateOffset,
@@ -545,6 +552,7 @@ library! {
     Anisodamping => anisodamping::Anisodamping,
     Anisoelasticity => anisoelasticity::Anisoelasticity,
     SpringCubic => spring_cubic::SpringCubic,
+    DriveSaturation => drive_saturation::DriveSaturation,
     ActuationGainMismatch => actuation_gain_mismatch::ActuationGainMismatch,
     ActuationSkew => actuation_skew::ActuationSkew,
     ActuationPhase => actuation_phase::ActuationPhase,

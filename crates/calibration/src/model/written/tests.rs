@@ -52,7 +52,7 @@ fn shown(id: EffectId) -> Vec<Values<f64>> {
                     Role::Chosen(_) => choice,
                     Role::Searched(Search::PatternHarmonic) => 4.0,
                     Role::Searched(_) | Role::Located(_) => 3.0,
-                    _ if p.name == "inverse_clip" => 1.12,
+                    _ if ["inverse_clip", "inverse_level"].contains(&p.name) => 1.12,
                     _ => p.neutral + p.scale * (2.0 - 0.7 * i as f64),
                 })
             })
