@@ -211,12 +211,12 @@ fn decay(finding: &Finding, runs: &[DecayRun], head: &Head) -> DecayReport {
 fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Head) -> Vec<String> {
     let mut out = Vec::new();
     if !finding.chosen.many_angles {
-        out.push(
+        out.push(format!(
             "the pattern stands near one angle: what anisodamping adds to precession and to the decay cannot be told from \
-             them there, and of the split only what lies at 45° to the pattern shows; decays at several starting angles \
-             would tell"
-                .into(),
-        );
+             them there, of the split only what lies at 45° to the pattern shows, and a scale of y that is 1 % larger than \
+             that of x makes the precession {:+.2} % larger; decays at several starting angles would tell",
+            (2.0 * finding.fit.model.axis_rad).cos()
+        ));
     }
     if finding.fit.model.has(Term::Precession) {
         let known = fitted.iter().any(|r| r.rate_is_known);
@@ -228,7 +228,7 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
     } else if let Some(run) = fitted.iter().find(|r| !r.rate_is_known) {
         out.push(format!("{}: the input rate is not stated, and is taken as zero", run.name));
     }
-    if !finding.fit.model.has(Term::GainRatio) {
+    if finding.chosen.many_angles && !finding.fit.model.has(Term::GainRatio) {
         out.push("the campaign cannot tell the detection gain ratio: the decays show no sign of unequal gains".into());
     }
     out.push("a free decay has no drive: there is no actuation gain ratio".into());

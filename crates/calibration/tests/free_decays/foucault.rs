@@ -11,12 +11,43 @@ pub(crate) const PIXELS_PER_M: f64 = 2000.0;
 /// Earth's rate about the vertical at 44°, deg/h.
 pub(crate) const RATE_DPH: f64 = 10.4;
 
+/// A camera that looks down on the pendulum: a pinhole at a height, with pixels that need not be square.
+#[derive(Clone, Copy)]
+pub(crate) struct Camera {
+    /// of the optical axis from the vertical, towards x and towards y, rad
+    pub(crate) tilt_rad: [f64; 2],
+    /// of the pinhole from the point over which the pendulum rests, m
+    pub(crate) aside_m: [f64; 2],
+    /// scale of y over that of x; negative where y points down
+    pub(crate) aspect: f64,
+}
+
+impl Camera {
+    /// Of the pinhole over the plane of rest, m.
+    const HEIGHT_M: f64 = 1.2;
+    pub(crate) const UPRIGHT: Self = Self { tilt_rad: [0.0; 2], aside_m: [0.0; 2], aspect: 1.0 };
+
+    /// Where a mass at (x, y), on a sphere of the pendulum's length, is seen, pixels.
+    fn sees(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let l = Pendulum::length_m();
+        let risen = l - (l * l - x * x - y * y).sqrt();
+        let (x, y, depth) = (x - self.aside_m[0], y - self.aside_m[1], Self::HEIGHT_M - risen);
+        let (sin, cos) = self.tilt_rad[0].sin_cos();
+        let (x, depth) = (x * cos - depth * sin, depth * cos + x * sin);
+        let (sin, cos) = self.tilt_rad[1].sin_cos();
+        let (y, depth) = (y * cos - depth * sin, depth * cos + y * sin);
+        let focal_px = PIXELS_PER_M * Self::HEIGHT_M;
+        [640.3 + focal_px * x / depth, 361.8 + self.aspect * focal_px * y / depth]
+    }
+}
+
 pub(crate) struct Pendulum {
     /// on a sphere, or in a bowl whose restoring force is in proportion
     pub(crate) spherical: bool,
     /// Δω at 45° to the swing, rad/s: makes quadrature grow
     pub(crate) split_rad_s: f64,
     pub(crate) noise_px: f64,
+    pub(crate) camera: Camera,
 }
 
 type State = [f64; 4];
@@ -65,8 +96,7 @@ impl Pendulum {
         let mut text = "t_s,x_v,y_v\n".to_owned();
         let (mut t, mut s) = (0.0, [0.15, 0.0, 0.0, 0.0]);
         while t < 1440.0 {
-            let x = 640.3 + PIXELS_PER_M * s[0] + self.noise_px * noise.normal();
-            let y = 361.8 + PIXELS_PER_M * s[1] + self.noise_px * noise.normal();
+            let [x, y] = self.camera.sees([s[0], s[1]]).map(|v| v + self.noise_px * noise.normal());
             let _ = writeln!(text, "{t:.6},{x:.3},{y:.3}");
             // a picture every 40 ms, some of them late, some lost
             let next = 0.04 * (1.0 + 0.2 * noise.even()) * if noise.even() < 0.01 { 2.0 } else { 1.0 };
