@@ -3,9 +3,9 @@
 
     python benches/minute.py [--rounds 3]
 
-Builds `cvg`, simulates a decay and a rotation of 60 s into the system's temporary folder unless they are there, as Parquet and as
-raw little-endian numbers, and runs `cvg identify` on each in a process of its own, on the file as the system has it cached. It
-fails where one takes half of the recording's duration, more than 1 GiB, or does not find the instrument.
+Builds `cvg`, simulates a decay and a rotation of 60 s into the system's temporary folder unless they are there, as Parquet, as raw
+little-endian numbers and, by h5py from these, as HDF5, and runs `cvg identify` on each in a process of its own, on the file as the
+system has it cached. It fails where one takes half of the recording's duration, more than 1 GiB, or does not find the instrument.
 """
 
 import argparse
@@ -17,6 +17,9 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+import h5py
+import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 DURATION_S, SAMPLE_HZ = 60.0, 200_000.0
@@ -53,6 +56,21 @@ def campaign(cvg, name, kind):
     return folder
 
 
+def as_hdf5(cvg, name):
+    """The same recording as the raw one, with its times, as HDF5."""
+    raw, folder = campaign(cvg, name, "f32"), Path(tempfile.gettempdir()) / f"cvg-minute-{name}-h5"
+    if not (folder / "campaign.toml").exists():
+        folder.mkdir(exist_ok=True)
+        xy = np.fromfile(raw / "run.f32", dtype="<f4").reshape(-1, 2)
+        with h5py.File(folder / "run.h5", "w") as file:
+            file.create_dataset("t_s", data=np.arange(len(xy)) / SAMPLE_HZ)
+            file.create_dataset("x_v", data=xy[:, 0])
+            file.create_dataset("y_v", data=xy[:, 1])
+        lines = (raw / "campaign.toml").read_text().replace("run.f32", "run.h5").splitlines()
+        (folder / "campaign.toml").write_text("\n".join(line for line in lines if not line.startswith("raw")))
+    return folder
+
+
 def run(command):
     """What a process says, its wall time in s and its peak memory in GiB."""
     start = time.perf_counter()
@@ -74,8 +92,8 @@ def main():
     cvg = str(Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release" / "cvg")
     failed = False
     for name in RUNS:
-        for kind in ["parquet", "f32"]:
-            folder = campaign(cvg, name, kind)
+        for kind in ["parquet", "f32", "h5"]:
+            folder = as_hdf5(cvg, name) if kind == "h5" else campaign(cvg, name, kind)
             rounds = [run([cvg, "identify", str(folder / "campaign.toml"), "--json"]) for _ in range(options.rounds)]
             gain = rounds[0][0]["angular_gain"]
             share = statistics.median(wall for _, wall, _ in rounds) / DURATION_S
