@@ -118,6 +118,9 @@ fn an_answer_is_the_same_as_by_identify_and_is_kept_while_its_files_are() {
     assert!(!prior.exists(), "it is of the answers before");
 }
 
+/// What somebody does to a file.
+type Harm<'a> = &'a dyn Fn(&Path);
+
 #[test]
 fn an_answer_that_is_not_whole_or_is_another_is_made_anew_and_one_of_an_earlier_day_is_no_answer() {
     let (folder, out) = (TempDir::new().unwrap(), TempDir::new().unwrap());
@@ -130,7 +133,7 @@ fn an_answer_that_is_not_whole_or_is_another_is_made_anew_and_one_of_an_earlier_
     let all = || ["report.json", "calibration.toml", "source.json"].map(|name| fs::read(own(0, name)).ok());
     let whole = all();
     assert!(whole.iter().all(Option::is_some));
-    let harm: [(&str, &dyn Fn(&Path)); 5] = [
+    let harm: [(&str, Harm<'_>); 5] = [
         ("calibration.toml", &|file| fs::remove_file(file).unwrap()),
         ("calibration.toml", &|file| fs::write(file, "device = \"another\"\n").unwrap()),
         ("report.json", &|file| fs::write(file, fs::read_to_string(file).unwrap() + " ").unwrap()),
