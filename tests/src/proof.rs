@@ -21,15 +21,16 @@ pub fn holds(claim: impl Fn(&mut Proof, Exact) -> Result<(), Refusal>) {
     holds_outside(&[], claim);
 }
 
-/// The claim with nothing planted is proved on every path but those that are outside for one of these reasons, each of
-/// which some path has.
+/// The claim with nothing planted is proved on every path but those that are outside, or on which a point was looked for in
+/// vain, for one of these reasons, each of which some path has.
 #[track_caller]
 pub fn holds_outside(reasons: &[&str], claim: impl Fn(&mut Proof, Exact) -> Result<(), Refusal>) {
     match prove(|proof| claim(proof, Exact::one())) {
         Ok(proved) => {
             println!("{proved:?}");
             let told: BTreeSet<String> = reasons.iter().map(ToString::to_string).collect();
-            assert_eq!(proved.outside, told, "what is outside of the claim, and what it says is");
+            let left: BTreeSet<String> = proved.outside.iter().chain(proved.unvisited.keys()).cloned().collect();
+            assert_eq!(left, told, "what is left out of the claim, and what it says is");
         }
         Err(refusal) => panic!("{refusal}"),
     }
@@ -38,6 +39,7 @@ pub fn holds_outside(reasons: &[&str], claim: impl Fn(&mut Proof, Exact) -> Resu
 /// The claim is refuted, with a point at which it fails, for each of the planted factors.
 #[track_caller]
 pub fn rejects(planted: &[Planted], claim: impl Fn(&mut Proof, Exact) -> Result<(), Refusal>) {
+    assert!(planted.iter().any(|(numerator, denominator)| numerator != denominator), "nothing is planted");
     for &(numerator, denominator) in planted {
         println!("{}", refuted(prove(|proof| claim(proof, Exact::ratio(numerator, denominator)))));
     }
@@ -76,5 +78,28 @@ pub fn rejects_rounding<T: Scalar + Format>(formula: &impl Formula, boxes: &[Inp
             Err(Failure::Refuted { at, error, .. }) => println!("{error:e} at {at:?} refutes {allowed:e}"),
             other => panic!("a planted error was not refuted: {other:?}"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cvg_prover::{Exact, Proof, Refusal};
+
+    use super::{WRONG, rejects};
+
+    fn a_square(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
+        let x = Exact::nonzero("x");
+        proof.equal("square", x * x, planted * x * x)
+    }
+
+    #[test]
+    fn a_claim_with_an_error_is_rejected() {
+        rejects(WRONG, a_square);
+    }
+
+    #[test]
+    #[should_panic(expected = "nothing is planted")]
+    fn a_twin_without_an_error_rejects_nothing() {
+        rejects(&[], a_square);
     }
 }

@@ -196,6 +196,60 @@ fn every_proof_has_its_twin_and_every_twin_its_proof() {
     }
 }
 
+/// The words of the body of the test `name` in the source `text`, in order of the alphabet.
+fn words_of<'a>(text: &'a str, name: &str) -> BTreeSet<&'a str> {
+    let (_, after) = text.split_once(&format!("fn {name}() {{\n")).unwrap_or_else(|| panic!("no test {name}"));
+    let body = after.lines().take_while(|line| line.trim() != "}");
+    let words = body.flat_map(|line| line.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
+    words.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic())).collect()
+}
+
+/// What is wrong with the twin of `proof` in `text`: it has to say of the same claim that it is refuted, and nothing else.
+fn of_another_claim(text: &str, proof: &str) -> Option<String> {
+    let (says, twin) = (words_of(text, proof), words_of(text, &format!("{proof}_twin")));
+    let more: Vec<_> = twin.difference(&says).copied().collect();
+    let less: Vec<_> = says.difference(&twin).copied().collect();
+    let refuted = matches!(more[..], ["rejects"] | ["WRONG" | "TOO_TIGHT", "rejects"] | ["rejects_rounding"]);
+    // holds outside of what a constant says why
+    let shown = match less[..] {
+        ["holds" | "bounded"] => true,
+        [reason, "holds_outside"] => reason.chars().all(|c| c.is_ascii_uppercase() || c == '_'),
+        _ => false,
+    };
+    (!refuted || !shown).then(|| format!("{proof}: {less:?} against {more:?}"))
+}
+
+#[test]
+fn every_twin_plants_its_error_in_the_claim_of_its_proof() {
+    let mut pairs = 0;
+    for file in test_sources() {
+        let name = format!("tests/tests/{}", file.file_name().expect("a file").to_string_lossy());
+        let text = read(&name);
+        for proof in tests_of(&name).iter().filter(|t| t.starts_with("identity_") || t.starts_with("interval_")) {
+            if !proof.ends_with("_twin") {
+                pairs += 1;
+                assert_eq!(of_another_claim(&text, proof), None, "{name}");
+            }
+        }
+    }
+    assert!(pairs > 100, "{pairs} pairs");
+}
+
+#[test]
+fn a_twin_of_another_claim_is_told() {
+    let text = |proof: &str, twin: &str| {
+        format!("fn identity_a() {{\n    {proof}\n}}\nfn identity_a_twin() {{\n    {twin}\n}}\n")
+    };
+    let found = |proof: &str, twin: &str| of_another_claim(&text(proof, twin), "identity_a").is_some();
+    assert!(!found("holds(a);", "rejects(WRONG, a);"));
+    assert!(!found("holds_outside(&[LIMITED], a);", "rejects(&[(7, 5)], a);"));
+    assert!(found("holds(a);", "rejects(WRONG, b);"), "another claim");
+    assert!(found("holds(a);", "rejects(WRONG, a); rejects(WRONG, b);"), "another beside it");
+    assert!(found("holds(a);", "holds(a);"), "the same");
+    assert!(found("holds(a);", "panic!();"), "none");
+    assert!(found("holds(a); holds(b);", "rejects(WRONG, a);"), "one of two");
+}
+
 #[test]
 fn the_audit_repeats_the_table_of_tolerances() {
     let audit = read("docs/src/audit.md");

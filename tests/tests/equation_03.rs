@@ -227,16 +227,23 @@ fn snapshot_of_a_step_response_into_the_limit() {
     let pi = Pi::new(2.0, 0.05, 0.01, 1.0).expect("inside the domain");
     let mut state = PiState::default();
     let mut table = String::from("  n   error    v_as  status   integral\n");
+    // in whole numbers: the errors in tenths and their sum, volts in fiftieths, of which the limit is 50
+    let (mut sum, limit) = (0, 50);
     for n in 0..16_i32 {
-        let error = if (4..10).contains(&n) { 0.8 } else { 0.1 };
-        let error = if n < 12 { error } else { -0.2 };
+        let tenths = if (4..10).contains(&n) { 8 } else { 1 };
+        let tenths = if n < 12 { tenths } else { -2 };
+        // 2 (e + Σ e · 0.01/0.1)
+        let asked = 10 * tenths + sum + tenths;
+        let limited = asked > limit;
+        sum += if limited { 0 } else { tenths };
+        let (error, volts, integral) =
+            (f64::from(tenths) / 10.0, f64::from(asked.min(limit)) / 50.0, f64::from(sum) / 1000.0);
+        let status = if limited { Status::Limited } else { Status::Within };
         let command: Command<f64> = pi.energy(&mut state, 1.0 + error, 1.0);
-        table += &format!(
-            "{n:3}{error:8.3}{:8.3}  {:8}{:9.4}\n",
-            command.volts,
-            format!("{:?}", command.status),
-            state.integral
-        );
+        assert_eq!(command.status, status, "{n}");
+        approx::assert_abs_diff_eq!(command.volts, volts, epsilon = 1e-12);
+        approx::assert_abs_diff_eq!(state.integral, integral, epsilon = 1e-12);
+        table += &format!("{n:3}{error:8.3}{volts:8.3}  {:8}{integral:9.4}\n", format!("{status:?}"));
     }
     insta::assert_snapshot!(table);
 }

@@ -7,10 +7,10 @@ use cvg_controller::pi::{Pi, PiState, energy_control, quadrature_control};
 use cvg_controller::{Command, Status};
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{ActuationGains, ControlOutputs, Envelope, Orbit, Real};
-use cvg_prover::{Exact, Formula, Proof, Refusal};
+use cvg_prover::{Exact, Formula, Proof, Refusal, prove};
 use cvg_tests::domain::{any_vector, octave};
 use cvg_tests::for_each_precision;
-use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, rejects, rejects_rounding};
+use cvg_tests::proof::{Inputs, TOO_TIGHT, WRONG, bounded, holds, holds_outside, rejects, rejects_rounding};
 use cvg_tests::tolerances::CONTROL;
 
 /// Any controller that can be built: gain, integration time, period and limit.
@@ -100,6 +100,9 @@ fn identity_within_the_limits_a_step_is_the_law_twin() {
     rejects(WRONG, within_the_limits_a_step_is_the_law);
 }
 
+/// Why on some paths no point need be found.
+const EXCLUDED: &str = "an integral and an output whose limits exclude each other: what is claimed is shown there too";
+
 /// On every path through the limits: any state, any measurement. A command that is limited is at its limit, and one
 /// that is not is the law's.
 fn the_output_is_within_its_limit(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
@@ -107,7 +110,7 @@ fn the_output_is_within_its_limit(proof: &mut Proof, planted: Exact) -> Result<(
     let (state, error) = (Exact::real("∫e dt"), Exact::real("e"));
     let mut state = PiState { integral: state };
     let Command { volts, status } = pi.control(&mut state, error);
-    proof.may_be_empty("an integral and an output whose limits exclude each other: what is claimed is shown there too");
+    proof.may_be_empty(EXCLUDED);
     match status {
         Status::Within => {
             proof.not_negative_by_path("below the limit", limit - volts)?;
@@ -127,7 +130,23 @@ fn the_output_is_within_its_limit(proof: &mut Proof, planted: Exact) -> Result<(
 //# The output MUST be finite and within its limit for every input.
 #[test]
 fn identity_the_output_is_within_its_limit() {
-    holds(the_output_is_within_its_limit);
+    holds_outside(&[EXCLUDED], the_output_is_within_its_limit);
+}
+
+#[test]
+fn the_audit_counts_the_paths_as_they_are() {
+    let proved = prove(|proof| the_output_is_within_its_limit(proof, Exact::one())).expect("it holds");
+    let unvisited: usize = proved.unvisited.values().sum();
+    let impossible = proved.paths - proved.covered - unvisited;
+    let expected = format!(
+        "has {} paths through its limits. Points are found on {}, for {impossible} it is shown that none lies there, and on the other \
+         {unvisited} the claims are shown",
+        proved.paths, proved.covered
+    );
+    let audit =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/src/audit.md")).expect("readable");
+    let audit = audit.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(audit.contains(&expected), "docs/src/audit.md does not say: {expected}");
 }
 
 #[test]
