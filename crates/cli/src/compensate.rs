@@ -48,6 +48,11 @@ fn targets(files: &[PathBuf], out: &Path) -> Result<Vec<PathBuf>, Failure> {
     if let [_] = files {
         return Ok(vec![out.to_owned()]);
     }
+    let is_file = out.extension().is_some_and(|e| ["csv", "parquet"].iter().any(|name| e.eq_ignore_ascii_case(name)));
+    if is_file && !out.is_dir() {
+        let what = format!("{}: {} recordings do not go into one file; wanted a folder", out.display(), files.len());
+        return Err(Failure::input(what));
+    }
     let named: Vec<PathBuf> = files
         .iter()
         .map(|file| {

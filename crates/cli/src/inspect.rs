@@ -90,16 +90,27 @@ fn table(s: &mut String, columns: &[Summary]) {
     let wide = columns.iter().map(|x| x.name.chars().count()).max().unwrap_or(0).clamp(10, 30);
     let _ = writeln!(
         s,
-        "  {:<wide$}{:>14}{:>14}{:>14}{:>9}  over time",
+        "  {:<wide$} {:>14} {:>14} {:>14} {:>8}  over time",
         "column", "smallest", "mean", "largest", "missing"
     );
     for x in columns {
         let _ = writeln!(
             s,
-            "  {:<wide$}{:>14.6}{:>14.6}{:>14.6}{:>9}  {}",
-            x.name, x.low, x.mean, x.high, x.missing, x.small
+            "  {:<wide$} {:>14} {:>14} {:>14} {:>8}  {}",
+            x.name,
+            short(x.low),
+            short(x.mean),
+            short(x.high),
+            x.missing,
+            x.small
         );
     }
+}
+
+/// A number in at most fourteen places.
+fn short(value: f64) -> String {
+    let digits = format!("{value:.6}");
+    if digits.len() <= 14 { digits } else { format!("{value:.7e}") }
 }
 
 fn summary(name: &str, values: &[f64]) -> Summary {

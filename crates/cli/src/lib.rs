@@ -23,6 +23,7 @@ mod paper;
 mod population;
 mod progress;
 mod report;
+mod report_keys;
 mod self_calibration;
 pub mod service;
 mod standard;
@@ -92,10 +93,12 @@ fn done(command: Command) -> Result<(), Failure> {
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
             let wanted = input::Wanted { naming: &naming, holdout: &holdout, settle_s: settle, sensor };
             let effects = commands::written(&effect)?;
+            limits.as_ref().map_or(Ok(()), |limits| limits.require_known(&effects.effects))?;
             commands::identify(|| input::campaign(&campaign, &wanted), effects, out.as_deref(), json, limits.as_ref())
         }
         Command::Fleet { campaigns, out, limits, prior, json } => {
             let limits = limits.as_deref().map(limits::Limits::read).transpose()?;
+            limits.as_ref().map_or(Ok(()), |limits| limits.require_known(&[]))?;
             fleet::fleet(&campaigns, &out, &fleet::Asked { limits: limits.as_ref(), json, prior })
         }
         Command::Compare { a, b, json } => compare::compare(&a, &b, json),

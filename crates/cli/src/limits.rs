@@ -9,7 +9,7 @@ use cvg_model::effects::EffectId;
 use serde_json::Value;
 use toml::Table;
 
-use crate::{Failure, output};
+use crate::{Failure, output, report_keys};
 
 /// What an element of a list is called by.
 const NAMES: [&str; 5] = ["id", "name", "file", "of", "channel"];
@@ -87,6 +87,15 @@ impl Limits {
         Ok(())
     }
 
+    /// Holds the names against those that a report has; `written` are effects beside those of the library.
+    ///
+    /// # Errors
+    /// Bad use where a limit names no number that a report may have, with the name that is nearest.
+    pub(crate) fn require_known(&self, written: &[EffectId]) -> Result<(), Failure> {
+        let unknown = self.0.iter().map(|limit| dotted(&limit.path)).find(|path| !report_keys::is_known(path, written));
+        unknown.map_or(Ok(()), |path| Err(unnamed(&path, written)))
+    }
+
     /// Judges a report, a line each on standard error; why it fails, where it does.
     ///
     /// # Errors
@@ -106,18 +115,26 @@ impl Limits {
     pub(crate) fn verdicts(&self, report: &Value) -> Result<Vec<Verdict>, Failure> {
         let held = |limit: &Limit| {
             let Limit { path, min, max } = limit.clone();
-            let value = match find(report, &path.replace('[', ".").replace(']', "")) {
+            let value = match find(report, &dotted(&path)) {
                 Found::Number(value) => Some(value),
                 Found::Null => None,
-                Found::Nothing => {
-                    let what = format!("--limits: `{path}` names no number of the report; wanted {WANTED}");
-                    return Err(Failure::input(what));
-                }
+                Found::Nothing => return Err(unnamed(&path, &[])),
             };
             Ok(Verdict { passes: value.is_some_and(|value| limit.holds(value)), path, value, min, max })
         };
         self.0.iter().map(held).collect()
     }
+}
+
+/// A place with the numbers of its elements between dots.
+fn dotted(path: &str) -> String {
+    path.replace('[', ".").replace(']', "")
+}
+
+fn unnamed(path: &str, written: &[EffectId]) -> Failure {
+    let nearest = report_keys::nearest(&dotted(path), written).filter(|nearest| *nearest != dotted(path));
+    let meant = nearest.map_or(String::new(), |nearest| format!("; `{nearest}` is near"));
+    Failure::input(format!("--limits: `{path}` names no number of the report{meant}; wanted {WANTED}"))
 }
 
 impl Limit {

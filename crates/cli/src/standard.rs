@@ -14,8 +14,9 @@ pub(crate) struct Entry {
     pub(crate) value: String,
 }
 
-/// The facts of a report under the standard's terms; what the campaign does not hold is said to be missing.
-pub(crate) fn entries(r: &Report) -> Vec<Entry> {
+/// The facts of a report under the standard's terms; what the campaign does not hold is said to be missing. Without a pattern
+/// nothing of it is asked for.
+pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
     let entry = |term, here, value: String| Entry { term, here, value };
     let k = r.angular_gain;
     let mut out = vec![
@@ -40,7 +41,7 @@ pub(crate) fn entries(r: &Report) -> Vec<Entry> {
             format!("{:.5}°", r.heldout.discovered.peak_to_peak_deg),
         ),
     ];
-    if r.instrument == "gyroscope" {
+    if has_pattern {
         out.push(entry(
             "drift, dependent on angle",
             "effect anisodamping: largest drift of the pattern, ½Δ(1/τ)",

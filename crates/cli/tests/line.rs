@@ -57,6 +57,48 @@ fn limits_are_judged_a_line_each_and_one_that_fails_is_told_by_the_exit_code() {
         assert_eq!(outcome.status, 2, "{nothing}: {}", outcome.stderr);
         assert!(outcome.stderr.contains("names no number of the report"), "{}", outcome.stderr);
     }
+    let absent = judged("\"runs.rot+501.csv.spikes\" = { max = 3 }\n");
+    assert_eq!(absent.status, 2, "a run that is not there: {}", absent.stderr);
+}
+
+#[test]
+fn a_limit_that_is_misspelt_is_told_before_anything_is_read_with_the_name_that_was_meant() {
+    let folder = TempDir::new().unwrap();
+    let limits = folder.path().join("limits.toml");
+    for (written, meant) in [
+        ("\"heldout.discoverd.rms_deg\" = { max = 1 }\n", "`heldout.discovered.rms_deg` is near"),
+        ("\"effects.detection-cubic.parameters.kapa.value\" = { max = 1 }\n", "parameters.kappa.value` is near"),
+        ("\"scale_factor.nonlinearity_ppm.vale\" = { max = 1 }\n", "`scale_factor.nonlinearity_ppm.value` is near"),
+    ] {
+        fs::write(&limits, written).unwrap();
+        // the campaign is not even there
+        let outcome = run(&[&"identify", &folder.path().join("none.toml"), &"--limits", &limits]);
+        assert_eq!(outcome.status, 2);
+        assert!(outcome.stderr.contains(meant), "{}", outcome.stderr);
+    }
+}
+
+/// Every number of a report, keys joined by dots.
+fn numbers(value: &Value, place: &str, found: &mut Vec<String>) {
+    let below = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, v)| numbers(v, &below(key), found)),
+        Value::Array(list) => list.iter().enumerate().for_each(|(i, v)| numbers(v, &below(&i.to_string()), found)),
+        Value::Number(_) => found.push(place.to_owned()),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_number_of_a_report_can_have_a_limit() {
+    let bench = over_temperature(|_, rate| rate);
+    let mut found = Vec::new();
+    numbers(&report(&bench.campaign()), "", &mut found);
+    assert!(found.len() > 100, "{}", found.len());
+    let text: String = found.iter().map(|place| format!("\"{place}\" = {{ min = -1e300 }}\n")).collect();
+    bench.write("limits.toml", text);
+    let outcome = run(&[&"identify", &bench.campaign(), &"--limits", &bench.path("limits.toml")]);
+    assert_eq!(outcome.status, 0, "{}", outcome.stderr);
 }
 
 #[test]
@@ -444,6 +486,8 @@ fn several_recordings_go_into_a_folder_and_never_onto_themselves() {
     let said = run(&[&"compensate", &calibration, &bench.path("rot*.csv"), &"--out", &out, &"--device", &"small"]);
     assert_eq!(said.status, 0, "{}", said.stderr);
     assert!(out.join("rot+500.csv").exists() && out.join("rot-300.csv").exists());
+    let one = run(&[&"compensate", &calibration, &bench.path("rot*.csv"), &"--out", &bench.path("one.csv")]);
+    assert!(one.status == 2 && one.stderr.contains("2 recordings do not go into one file"), "{}", one.stderr);
     let before = bench.read("rot+500.csv");
     let onto = run(&[&"compensate", &calibration, &bench.path("rot*.csv"), &"--out", &bench.path(".")]);
     assert_eq!(onto.status, 2, "{}", onto.stderr);

@@ -36,7 +36,13 @@ pub(super) fn has_pattern(identified: &Identification) -> bool {
 
 /// What was found: before the figures.
 pub(super) fn found(h: &mut String, identified: &Identification) {
-    let declared = if has_pattern(identified) { "those of the paper's model" } else { "unequal gains of two channels" };
+    let declared = if has_pattern(identified) {
+        "Declared effects are those of the paper's model, which every campaign is asked for"
+    } else if is_rate_gyroscope(identified) {
+        "A rate gyroscope is asked for its bias, its lag and its scale factor, which is |k|"
+    } else {
+        "Declared effects are unequal gains of two channels, which every campaign is asked for"
+    };
     effects(h, &identified.report, declared);
     parameters(h, identified);
 }
@@ -49,36 +55,50 @@ pub(super) fn besides(h: &mut String, identified: &Identification) {
     correlations(h, identified);
     steps(h, identified);
     left(h, r);
-    words(h, r);
+    words(h, r, has_pattern(identified));
     files(h, r);
 }
 
-/// A table with a header; `rows` writes its rows.
+/// A table with a header; `rows` writes its rows. A column in which no row has anything is named in the caption and left out.
 pub(super) fn table(h: &mut String, label: &str, columns: &[&str], rows: impl FnOnce(&mut String)) {
+    let mut body = String::new();
+    rows(&mut body);
+    let told = told(&body, columns.len());
+    let untold: Vec<&str> = columns.iter().zip(&told).filter(|(_, told)| !**told).map(|(c, _)| *c).collect();
+    let nothing = if untold.is_empty() { String::new() } else { format!("; nothing under: {}", untold.join(", ")) };
     let _ = write!(
         h,
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}</caption><thead><tr>",
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}{nothing}</caption><thead><tr>",
         escape(label)
     );
-    for c in columns {
+    for c in columns.iter().zip(&told).filter(|(_, told)| **told).map(|(c, _)| c) {
         let _ = write!(h, "<th scope=\"col\">{c}</th>");
     }
     h.push_str("</tr></thead><tbody>");
-    let mut body = String::new();
-    rows(&mut body);
-    labelled(h, &body, columns);
+    labelled(h, &body, columns, &told);
     h.push_str("</tbody></table></div>");
 }
 
+/// Whether any row has something in each column but the first, whose absence is a dash.
+fn told(body: &str, columns: usize) -> Vec<bool> {
+    let is_dash = |cell: &str| cell.split_once('>').is_some_and(|(_, text)| text.starts_with("—</td>"));
+    let rows: Vec<Vec<&str>> = body.split_inclusive("</tr>").map(|line| line.split("<td").skip(1).collect()).collect();
+    let any = |at: usize| rows.iter().any(|cells| cells.get(at).is_some_and(|cell| !is_dash(cell)));
+    (0..columns).map(|at| at == 0 || rows.is_empty() || any(at)).collect()
+}
+
 /// The rows, each cell with the name of its column, which a narrow page writes in front of it.
-fn labelled(h: &mut String, body: &str, columns: &[&str]) {
+fn labelled(h: &mut String, body: &str, columns: &[&str], told: &[bool]) {
     for line in body.split_inclusive("</tr>") {
         for (at, part) in line.split("<td").enumerate() {
-            if at > 0 {
+            if at == 0 {
+                h.push_str(part);
+            } else if told.get(at - 1).copied().unwrap_or(true) {
                 let name = columns.get(at - 1).copied().unwrap_or_default();
-                let _ = write!(h, "<td data-label=\"{name}\"");
+                let _ = write!(h, "<td data-label=\"{name}\"{part}");
+            } else if let Some((_, end)) = part.split_once("</td>") {
+                h.push_str(end);
             }
-            h.push_str(part);
         }
     }
 }
@@ -183,7 +203,7 @@ fn correlations(h: &mut String, identified: &Identification) {
 fn effects(h: &mut String, r: &Report, declared: &str) {
     let _ = write!(
         h,
-        "<h2 id=\"effects\">Effects</h2><p>Declared effects are {declared}, which every campaign is asked for; \
+        "<h2 id=\"effects\">Effects</h2><p>{declared}; \
          discovered ones were added because the data ask for them; an empirical one describes what no effect of the library \
          explains.</p>",
     );
@@ -282,10 +302,10 @@ fn shares(h: &mut String, r: &Report) {
 }
 
 /// The facts under the names that IEEE Std 1431 has for them.
-fn words(h: &mut String, r: &Report) {
+fn words(h: &mut String, r: &Report, has_pattern: bool) {
     h.push_str("<h2 id=\"standard\">In the words of IEEE Std 1431</h2>");
     table(h, "Terms of the standard", &["term", "here", "value"], |h| {
-        for entry in standard::entries(r) {
+        for entry in standard::entries(r, has_pattern) {
             row(h, &[entry.term, &escape(entry.here), &escape(&entry.value)]);
         }
     });
