@@ -254,6 +254,59 @@ fn a_run_at_rest_alone_is_answered_with_its_allan_deviation() {
     assert!(!out.join("calibration.toml").exists(), "nothing to compensate with");
 }
 
+/// The walk told of a recording at rest whose rows `change` makes anew from time, s, and angle, deg.
+fn walk_of(change: impl Fn(usize, f64) -> f64, column: &str, extra: &str) -> Value {
+    let folder = TempDir::new().unwrap();
+    let text = at_rest(40_000, 1, false);
+    let mut followed = Vec::new();
+    for line in text.lines().skip(1) {
+        let angle: f64 = line.split_once(',').unwrap().1.parse().unwrap();
+        let last = followed.last().copied().unwrap_or(angle);
+        followed.push(last + (angle - last + 90.0).rem_euclid(180.0) - 90.0);
+    }
+    let mut out = format!("t_s,{column}\n");
+    for i in 0..followed.len() {
+        let step = (followed[i] - followed[i.saturating_sub(1)]) / 0.1;
+        let _ = writeln!(out, "{},{}", i as f64 * 0.1, change(i, if column == "gz" { step } else { followed[i] }));
+    }
+    let campaign = static_campaign(folder.path(), &[("rest.csv", out)]);
+    let text = fs::read_to_string(&campaign).unwrap();
+    fs::write(&campaign, format!("{text}{extra}")).unwrap();
+    report(&campaign)
+}
+
+#[test]
+fn the_walk_of_recorded_rates_is_that_of_their_sum() {
+    let r = walk_of(|_, rate| rate, "gz", "\n[columns]\ntheta_deg = \"integral(gz)\"\n");
+    let [walk, low, high] = estimate(&r["allan"]["angle_random_walk_deg_sqrt_h"]);
+    assert!(low < 1.02 * WALK && WALK < 1.02 * high && (walk / WALK - 1.0).abs() < 0.03, "{walk} [{low} {high}]");
+}
+
+#[test]
+fn an_angle_at_rest_with_too_few_digits_tells_no_walk_and_says_so() {
+    let r = walk_of(|_, angle| (10.0 * angle).round() / 10.0, "theta_deg", "");
+    assert!(r["allan"]["angle_random_walk_deg_sqrt_h"].is_null(), "{}", r["allan"]["angle_random_walk_deg_sqrt_h"]);
+    assert!(r["warnings"].to_string().contains("in steps of 1.00e-1°"), "{}", r["warnings"]);
+}
+
+#[test]
+fn rows_at_rest_that_stand_still_are_left_out_and_named() {
+    let stuck = std::cell::Cell::new(0.0);
+    let r = walk_of(
+        |i, angle| {
+            if i == 10_000 {
+                stuck.set(angle);
+            }
+            if (10_000..20_000).contains(&i) { stuck.get() } else { angle }
+        },
+        "theta_deg",
+        "",
+    );
+    let [walk, ..] = estimate(&r["allan"]["angle_random_walk_deg_sqrt_h"]);
+    assert!((walk / WALK - 1.0).abs() < 0.03, "{walk}");
+    assert!(r["warnings"].to_string().contains("10000 of 40000 rows at rest repeat one value"), "{}", r["warnings"]);
+}
+
 #[test]
 fn the_angle_of_two_channels_at_rest_wanders_as_the_angle_itself_does() {
     let folder = TempDir::new().unwrap();

@@ -54,7 +54,8 @@ pub(super) fn admit(mut table: Table, naming: &Naming, source: &Path) -> Result<
     set_aside(&mut table, bare, &mut warnings);
     dropped.missing_values.retain(|(channel, _)| table.numbers.iter().any(|column| column.channel == *channel));
     say(&table, &dropped, &mut warnings);
-    Ok(Recording { readout_unit, ..assemble(table, source, dropped, warnings) })
+    let theta_is_integral = naming.is_integral(Channel::Theta);
+    Ok(Recording { readout_unit, theta_is_integral, ..assemble(table, source, dropped, warnings) })
 }
 
 /// Takes every column to the unit of its channel: by the factor of the mapping, else by the unit that the file states below

@@ -70,6 +70,8 @@ pub struct Recording {
     pub ys_v: Option<Vec<f64>>,
     /// The instrument's own angle, deg, any wrapping.
     pub theta_deg: Option<Vec<f64>>,
+    /// [`Recording::theta_deg`] is the integral over time of rates that were recorded, by the trapezoidal rule.
+    pub theta_is_integral: bool,
     /// Output of the energy controller, V.
     pub vas_v: Option<Vec<f64>>,
     /// Output of the quadrature controller, V.

@@ -44,19 +44,18 @@ impl Naming {
             let names = in_words(Channel::ALL.into_iter().map(Channel::name));
             return Err(format!("`{}` is no channel; wanted one of {names}", channel.trim()));
         };
-        let factored = column.rfind(['*', '/']).and_then(|at| {
-            let number = column[at + 1..].trim().parse::<f64>().ok()?;
-            Some((&column[..at], if column[at..].starts_with('*') { number } else { number.recip() }))
-        });
-        let scale = factored.map(|(_, scale)| scale);
-        let column = factored.map_or(column, |(column, _)| column).trim();
+        let (column, mut scale) = factored(column);
         let rate = column.strip_prefix("integral(").and_then(|rate| rate.strip_suffix(')')).map(str::trim);
         if rate.is_some() && !matches!(channel, Channel::Theta | Channel::Table) {
             return Err(format!(
                 "`{text}`: an integral over time is an angle; wanted theta_deg or table_deg before the `=`"
             ));
         }
-        let column = rate.unwrap_or(column).to_owned();
+        let (column, within) = rate.map_or((column, None), factored);
+        if within.is_some() {
+            scale = Some(scale.unwrap_or(1.0) * within.unwrap_or(1.0));
+        }
+        let column = column.to_owned();
         if column.is_empty() {
             return Err(format!("`{text}` names no column; wanted CHANNEL=COLUMN, as in theta_deg=Ch3"));
         }
@@ -144,6 +143,15 @@ impl Naming {
     }
 }
 
+/// A column, and the number that it is multiplied by or, as a reciprocal, divided by.
+fn factored(text: &str) -> (&str, Option<f64>) {
+    let number = text.rfind(['*', '/']).and_then(|at| {
+        let number = text[at + 1..].trim().parse::<f64>().ok()?;
+        Some((text[..at].trim(), if text[at..].starts_with('*') { number } else { number.recip() }))
+    });
+    number.map_or((text.trim(), None), |(column, scale)| (column, Some(scale)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,6 +186,20 @@ mod tests {
         assert_eq!(of(Channel::Xc), ("a*b", Some(2.0)));
         assert_eq!(of(Channel::Yc), ("rad/s", None), "what is no number is part of the name");
         assert_eq!(of(Channel::Temperature), ("x/2", Some(1.0)));
+    }
+
+    #[test]
+    fn a_rate_may_have_its_factor_within_the_integral_or_behind_it() {
+        for entry in ["theta_deg=integral(gz*0.25)", "theta_deg = integral( gz / 4 )", "theta_deg=integral(gz)*0.25"] {
+            let mut naming = Naming::default();
+            assert_eq!(naming.add(entry), Ok(()), "{entry}");
+            assert_eq!(
+                (naming.column(Channel::Theta), naming.factor(Channel::Theta)),
+                (Some("gz"), Some(0.25)),
+                "{entry}"
+            );
+            assert!(naming.is_integral(Channel::Theta));
+        }
     }
 
     #[test]

@@ -23,6 +23,11 @@ const FEWEST: usize = 64;
 const MOVES: f64 = 20.0;
 const FASTEST_DPS: f64 = 0.5;
 const OVER: [usize; 2] = [1, 8];
+/// An angle mostly repeats the row before where this share of its steps is nothing.
+const MOSTLY: f64 = 0.5;
+/// So many rows of one value are a recording that stood still, where no more than this share of the others repeat.
+const STANDS_STILL: usize = 30;
+const SELDOM: f64 = 0.05;
 /// Share of a run's rows that may be motion.
 const MOST_MOVING: f64 = 0.1;
 /// Mean rates at consecutive intervals that go together so closely are no noise; looked at for intervals of up to so many
@@ -71,8 +76,11 @@ pub(crate) fn allan(
         let drift = rest.drift()?;
         drifts |= drift.is_some();
         warnings.extend(drift);
+        warnings.extend(rest.without_rows_that_stand_still());
         warnings.extend(rest.without_motion()?);
     }
+    let digit =
+        rests.iter().filter_map(AtRest::digit).fold(None, |most: Option<f64>, d| Some(most.map_or(d, |m| m.max(d))));
     let Some(longest) = rests.iter().max_by(|a, b| a.length_s.total_cmp(&b.length_s)) else {
         return Err(Refusal::no_answer("campaign", "there is no run at rest", "a run with kind = \"static\""));
     };
@@ -92,7 +100,8 @@ pub(crate) fn allan(
     let octaves: Vec<usize> = std::iter::successors(Some(1usize), |m| Some(2 * m))
         .take_while(|m| points.last().is_some_and(|p| *m as f64 * interval_s <= p.tau_s))
         .collect();
-    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves)).filter(|_| !drifts);
+    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves))
+        .filter(|_| !drifts && digit.is_none());
     let (bottom, at_the_end) = bottom(&points).ok_or_else(|| {
         Refusal::no_answer(&longest.name, "the angle at rest does not change at all", "an angle with all its digits")
     })?;
@@ -103,8 +112,17 @@ pub(crate) fn allan(
             bottom.tau_s
         ));
     }
-    if walk.is_none() && !drifts {
-        warnings.push("angle_random_walk_deg_sqrt_h is null: no stretch of the Allan deviation falls as 1/√τ".into());
+    if let Some(digit) = digit {
+        warnings.push(format!(
+            "the angle at rest goes in steps of {digit:.2e}° and mostly repeats the row before: its noise is below its last digit, \
+             so that angle_random_walk_deg_sqrt_h is null, and bias_instability_dph is what it is at most; wanted: more digits"
+        ));
+    } else if walk.is_none() && !drifts {
+        warnings.push(
+            "angle_random_walk_deg_sqrt_h is null: no stretch of the Allan deviation falls as 1/√τ; a rate in the place of \
+             theta_deg looks like that: of one the angle is theta_deg = \"integral(COLUMN)\" in [columns]"
+                .into(),
+        );
     }
     let hour = 3600.0;
     let dph = |v: f64| v * hour;
@@ -146,6 +164,7 @@ impl AtRest {
             ));
         }
         let wrapped_deg: Vec<f64> = match (&r.theta_deg, &r.xc_v, &r.yc_v) {
+            (Some(theta), ..) if r.theta_is_integral => summed(t_s, &theta[settled]),
             (Some(theta), ..) => theta[settled].to_vec(),
             (None, Some(x), Some(y)) => {
                 let part = |v: &Option<Vec<f64>>, i: usize| v.as_ref().map_or(0.0, |v| v[i]);
@@ -224,6 +243,43 @@ impl AtRest {
         (product > GOES_ON * square).then(|| square.sqrt())
     }
 
+    /// The step of an angle that mostly repeats the row before; none where it does not.
+    fn digit(&self) -> Option<f64> {
+        let steps = || self.stretches.iter().flat_map(|s| s.windows(2).map(|w| (w[1] - w[0]).abs()));
+        let (count, zeros) = steps().fold((0.0, 0.0), |(n, z), d| (n + 1.0, z + f64::from(u8::from(d == 0.0))));
+        let largest = steps().fold(0.0, f64::max);
+        let least = steps().filter(|d| *d > 1e-9 * largest).fold(largest, f64::min);
+        (zeros > MOSTLY * count && least > 0.0).then_some(least)
+    }
+
+    /// Leaves out rows that repeat one value for long while the others do not, each as a gap; says so.
+    fn without_rows_that_stand_still(&mut self) -> Option<String> {
+        let rows: usize = self.stretches.iter().map(Vec::len).sum();
+        let parts = || self.stretches.iter().flat_map(|s| s.chunk_by(|a, b| a == b));
+        let still: usize = parts().map(<[f64]>::len).filter(|n| *n >= STANDS_STILL).sum();
+        let repeat: usize = parts().map(<[f64]>::len).filter(|n| (2..STANDS_STILL).contains(n)).sum();
+        if still == 0 || 2 * still > rows || repeat as f64 > SELDOM * (rows - still) as f64 {
+            return None;
+        }
+        let mut kept: Vec<Vec<f64>> = Vec::new();
+        for stretch in &self.stretches {
+            kept.push(Vec::new());
+            for part in stretch.chunk_by(|a, b| a == b) {
+                match kept.last_mut() {
+                    Some(last) if part.len() < STANDS_STILL => last.extend(part),
+                    _ => kept.push(Vec::new()),
+                }
+            }
+        }
+        kept.retain(|stretch| !stretch.is_empty());
+        self.stretches = kept;
+        Some(format!(
+            "{}: {still} of {rows} rows at rest repeat one value for {STANDS_STILL} rows or longer, and the others do not: the \
+             recording stood still; they are left out, and no difference reaches across",
+            self.name
+        ))
+    }
+
     /// Leaves out rows in which the instrument moves, each as a gap; says so.
     ///
     /// # Errors
@@ -276,6 +332,25 @@ fn moving(angles: &[f64], interval_s: f64) -> Vec<bool> {
         for (at, _) in steps.iter().enumerate().filter(|(_, d)| d.abs() > limit) {
             out[at..=at + over].fill(true);
         }
+    }
+    out
+}
+
+/// The angle that recorded rates sum up to, θᵢ = θᵢ₋₁ + Ωᵢ Δtᵢ, from their integral by the trapezoidal rule: that takes the mean
+/// of neighbours, and half of white noise out of them. What alternates from row to row and is lost in the means is none.
+fn summed(t_s: &[f64], integral: &[f64]) -> Vec<f64> {
+    let mut rates = vec![0.0];
+    for (angle, t) in integral.windows(2).zip(t_s.windows(2)) {
+        let mean = (angle[1] - angle[0]) / (t[1] - t[0]);
+        rates.push(2.0 * mean - rates[rates.len() - 1]);
+    }
+    let sign = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+    let alternates = rates.iter().enumerate().map(|(i, r)| sign(i) * r).sum::<f64>() / rates.len() as f64;
+    let mut angle = integral.first().copied().unwrap_or(0.0);
+    let mut out = vec![angle];
+    for (i, t) in t_s.windows(2).enumerate() {
+        angle += (rates[i + 1] - alternates * sign(i + 1)) * (t[1] - t[0]);
+        out.push(angle);
     }
     out
 }

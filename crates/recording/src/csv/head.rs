@@ -223,7 +223,7 @@ fn understand(
     }
     if let Err(error) = std::str::from_utf8(text) {
         let what = format!("the header is not UTF-8 from byte {} of the line on", error.valid_up_to() + 1);
-        return refuse(what, "a header in UTF-8");
+        return refuse(what, "a header in UTF-8, as `iconv -f windows-1252 -t utf-8` makes of the usual other one");
     }
     let fields = |separator: u8| text.iter().filter(|&&byte| byte == separator).count();
     let separator =
