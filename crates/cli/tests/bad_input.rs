@@ -163,6 +163,19 @@ fn a_ring_down_named_as_a_rotation_is_refused() {
 }
 
 #[test]
+fn a_run_in_millivolts_among_runs_in_volts_is_named() {
+    let bench = Bench::small();
+    change_sheet(&bench, "rot-300.csv", |sheet| {
+        for column in ["xc_v", "xs_v", "yc_v", "ys_v"] {
+            sheet.set(column, |_, v| 1e3 * v);
+        }
+    });
+    let outcome = cvg(&["identify".as_ref(), bench.campaign().as_os_str()]);
+    assert_eq!(outcome.status, 1, "{}", outcome.stdout);
+    assert!(outcome.stderr.contains("rot-300.csv: its readout's amplitude is 1.0"), "{}", outcome.stderr);
+}
+
+#[test]
 fn an_empty_file_is_refused() {
     let bench = Bench::small();
     bench.write("rot-300.csv", "");

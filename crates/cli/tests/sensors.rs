@@ -303,3 +303,175 @@ fn what_belongs_to_the_table_is_no_error_of_the_device() {
     assert!(headline.contains("0.156°") && headline.contains("6.6 times less"), "{headline}");
     assert!(headline.contains("0.141° rms of it are the table's"), "{headline}");
 }
+
+/// What is drawn by a sensor of this amplitude, offset and gain ratio, turned by hand through `periods` periods a turn; with
+/// the angle of the shaft, deg.
+struct Drawn {
+    amplitude: f64,
+    offset: f64,
+    gain: f64,
+    periods: f64,
+    seed: u64,
+}
+
+const DRAWN: Drawn = Drawn { amplitude: 1.0, offset: 0.05, gain: 1.04, periods: 1.0, seed: 0 };
+
+impl Drawn {
+    /// The rows, each as `cells` makes it of time, angle of the shaft and both readings.
+    fn text(&self, header: &str, cells: impl Fn(f64, f64, f64, f64) -> Vec<f64>) -> String {
+        let mut text = format!("{header}\n");
+        for i in 0..3000 {
+            let t = f64::from(i) * 0.01;
+            let shaft = 40.0 * t + 25.0 * (0.7 * t).sin();
+            let (sin, cos) = (self.periods * shaft).to_radians().sin_cos();
+            let x = self.amplitude * (cos + self.offset + 2e-4 * noise(i as usize, 11 + self.seed));
+            let y = self.amplitude * (self.gain * sin - self.offset + 2e-4 * noise(i as usize, 101 + self.seed));
+            let row: Vec<String> = cells(t, shaft, x, y).iter().map(f64::to_string).collect();
+            let _ = writeln!(text, "{}", row.join(","));
+        }
+        text
+    }
+
+    fn blind(&self) -> String {
+        self.text("t_s,xc_v,yc_v", |t, _, x, y| vec![t, x, y])
+    }
+
+    fn with_shaft(&self) -> String {
+        self.text("t_s,table_deg,xc_v,yc_v", |t, shaft, x, y| vec![t, shaft, x, y])
+    }
+}
+
+fn given(files: &[&Path]) -> support::Outcome {
+    let mut arguments: Vec<&OsStr> = vec!["identify".as_ref()];
+    arguments.extend(files.iter().map(|f| f.as_os_str()));
+    arguments.push("--sensor".as_ref());
+    let mut outcome = cvg(&arguments);
+    // what is said beside an answer stands in its summary
+    outcome.stderr = format!("{}{}", outcome.stdout, outcome.stderr);
+    outcome
+}
+
+#[test]
+fn a_run_of_another_sensor_or_in_another_unit_is_named_with_and_without_a_reference() {
+    let folder = TempDir::new().unwrap();
+    let other = Drawn { offset: -0.04, gain: 0.97, ..DRAWN };
+    let millivolts = Drawn { amplitude: 1e3, ..DRAWN };
+    for (of, text) in [(Drawn::blind as fn(&Drawn) -> String, "blind"), (Drawn::with_shaft, "shaft")] {
+        let [a, b, c] = [("a", 1), ("b", 2), ("c", 3)]
+            .map(|(n, seed)| written(&folder, &format!("{text}-{n}.csv"), &of(&Drawn { seed, ..DRAWN })));
+        let odd = written(&folder, &format!("{text}-odd.csv"), &of(&other));
+        let scaled = written(&folder, &format!("{text}-scaled.csv"), &of(&millivolts));
+        let two = given(&[&a, &odd]);
+        assert_eq!(two.status, 1, "{}", two.stdout);
+        assert!(two.stderr.contains("odd.csv: its channels do not draw what those of"), "{}", two.stderr);
+        let two = given(&[&a, &scaled]);
+        assert!(two.status == 1 && two.stderr.contains("scaled.csv: its amplitude is 9.99"), "{}", two.stderr);
+        let many = given(&[&a, &b, &c, &odd]);
+        assert_eq!(many.status, 0, "{}", many.stderr);
+        assert!(many.stderr.contains("odd.csv: left out") && many.stdout.contains("1.0400"), "{many:?}");
+    }
+}
+
+#[test]
+fn a_channel_that_stands_still_is_named() {
+    let folder = TempDir::new().unwrap();
+    let text = DRAWN.text("t_s,table_deg,xc_v,yc_v", |t, shaft, x, _| vec![t, shaft, x, 0.3]);
+    let told = given(&[&written(&folder, "dead.csv", &text)]);
+    assert!(told.status == 1 && told.stderr.contains("dead.csv: yc_v stands still, at 0.3"), "{}", told.stderr);
+}
+
+#[test]
+fn periods_that_are_no_whole_number_are_doubted_with_the_unit_that_would_make_them_one() {
+    let folder = TempDir::new().unwrap();
+    let scaled =
+        |factor: f64| DRAWN.text("t_s,table_deg,xc_v,yc_v", move |t, shaft, x, y| vec![t, factor * shaft, x, y]);
+    let gon = given(&[&written(&folder, "gon.csv", &scaled(1.0 / 0.9))]);
+    assert!(gon.status == 0 && gon.stderr.contains("0.9000 periods a turn is no whole number"), "{}", gon.stderr);
+    assert!(gon.stderr.contains("the reference were in gon"), "{}", gon.stderr);
+    let geared = given(&[&written(&folder, "geared.csv", &scaled(1.0 / 2.5))]);
+    assert!(geared.stderr.contains("2.5000 periods a turn is no whole number"), "{}", geared.stderr);
+    let rad = given(&[&written(&folder, "rad.csv", &scaled(1f64.to_radians()))]);
+    assert!(rad.status == 2 && rad.stderr.contains("the reference were in rad"), "{}", rad.stderr);
+    let whole = given(&[&written(&folder, "whole.csv", &scaled(1.0))]);
+    assert!(!whole.stderr.contains("whole number"), "{}", whole.stderr);
+}
+
+/// 100 periods a turn, 190° of them from row to row at an even speed, look like 89.47 the other way.
+#[test]
+fn rows_between_which_the_angle_may_have_gone_either_way_are_no_answer() {
+    let folder = TempDir::new().unwrap();
+    let mut text = String::from("t_s,table_deg,xc_v,yc_v\n");
+    for i in 0..2000 {
+        let shaft = 1.9 * f64::from(i);
+        let (sin, cos) = (100.0 * shaft).to_radians().sin_cos();
+        let _ = writeln!(text, "{},{shaft},{},{}", f64::from(i) * 0.01, cos + 2e-4 * noise(i as usize, 3), 1.04 * sin);
+    }
+    let told = given(&[&written(&folder, "fine.csv", &text)]);
+    assert!(told.status == 1 && told.stderr.contains("periods a turn fit, and 100 as well"), "{}", told.stderr);
+}
+
+#[test]
+fn a_reference_that_slips_is_named_with_its_time() {
+    let folder = TempDir::new().unwrap();
+    let slips = DRAWN
+        .text("t_s,table_deg,xc_v,yc_v", |t, shaft, x, y| vec![t, shaft + f64::from(u8::from(t > 15.0)) * 2.0, x, y]);
+    let told = given(&[&written(&folder, "slips.csv", &slips)]);
+    assert!(
+        told.stderr.contains("slips.csv: the angle and its reference part by") && told.stderr.contains("at 15.010 s"),
+        "{}",
+        told.stderr
+    );
+    let sound = given(&[&written(&folder, "sound.csv", &DRAWN.with_shaft())]);
+    assert!(!sound.stderr.contains("part by"), "{}", sound.stderr);
+}
+
+#[test]
+fn an_amplitude_that_changes_in_the_course_of_a_run_is_named() {
+    let folder = TempDir::new().unwrap();
+    let fades =
+        DRAWN.text("t_s,xc_v,yc_v", |t, _, x, y| vec![t, x * (1.0 - 0.05 * t / 30.0), y * (1.0 - 0.05 * t / 30.0)]);
+    let told = given(&[&written(&folder, "fades.csv", &fades)]);
+    assert!(told.stderr.contains("fades.csv: the amplitude changes by 2.9 %"), "{}", told.stderr);
+    assert!(!given(&[&written(&folder, "even.csv", &DRAWN.blind())]).stderr.contains("amplitude changes"));
+}
+
+#[test]
+fn an_angle_in_counts_or_in_radians_is_told_what_it_looks_like() {
+    let folder = TempDir::new().unwrap();
+    let word = |turn: f64, whole: bool| {
+        DRAWN.text("t_s,table_deg,theta_deg", move |t, shaft, _, _| {
+            let value = (shaft + 0.4 * (shaft.to_radians() + 1.0).sin()).rem_euclid(360.0) / 360.0 * turn;
+            vec![t, shaft, if whole { value.floor() } else { value }]
+        })
+    };
+    let counts = given(&[&written(&folder, "word.csv", &word(16384.0, true))]);
+    assert!(
+        counts.status == 1 && counts.stderr.contains("counts of 14 bits (theta_deg = \"…/45.511111\""),
+        "{}",
+        counts.stderr
+    );
+    let rad = given(&[&written(&folder, "rad.csv", &word(std::f64::consts::TAU, false))]);
+    assert!(rad.status == 1 && rad.stderr.contains("as if in rad (theta_deg = \"…*57.29578\""), "{}", rad.stderr);
+}
+
+/// What the page on signs says: three mistakes that look alike, and the ratio of the third.
+#[test]
+fn what_a_sign_means_and_what_cannot_be_told_is_as_the_page_on_signs_says() {
+    let folder = TempDir::new().unwrap();
+    let mut page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/signs.md")).unwrap();
+    page.retain(|c| c != '`');
+    let drawn = Drawn { periods: 4.0, ..DRAWN };
+    let header = "t_s,table_deg,xc_v,yc_v";
+    for (what, text, k, ratio) in [
+        ("as it is", drawn.with_shaft(), -4.0, 1.04),
+        ("the reference the other way", drawn.text(header, |t, a, x, y| vec![t, -a, x, y]), 4.0, 1.04),
+        ("Y the other way", drawn.text(header, |t, a, x, y| vec![t, a, x, -y]), 4.0, 1.04),
+        ("X and Y exchanged", drawn.text(header, |t, a, x, y| vec![t, a, y, x]), 4.0, 1.0 / 1.04),
+    ] {
+        let r = sensor(&written(&folder, "signs.csv", &text));
+        let found = r["detection_gain_ratio"]["value"].as_f64().unwrap();
+        assert_eq!(r["angular_gain"]["value"].as_f64(), Some(k), "{what}");
+        assert!((found / ratio - 1.0).abs() < 1e-4, "{what}: {found}");
+        assert!(page.contains(&format!("| {what} | {k} | {found:.4} |")), "{what}: {k} {found:.4}");
+    }
+}

@@ -6,10 +6,13 @@ use super::effects::Described;
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, Term};
+use super::rate_runs;
 use super::report::{Errors, Finding, Head, report};
-use super::samples::{SensorRun, apart, prepare};
+use super::samples::{Reading, SensorRun, apart, prepare, span};
 use super::screening::believed;
+use super::sensor::other_unit;
 use super::table_fit::Sample;
+use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
 use crate::estimation::statistics::median;
@@ -43,6 +46,8 @@ const ROWS_PER_HARMONIC: usize = 12;
 const TIME_WAVES: usize = 4;
 /// Turns from which on a time is told from a position by more than a straight line.
 const TURNS_FOR_WAVES: f64 = 1.5;
+/// Values of an angle fill a turn that they span this share of.
+const FILLED: f64 = 0.9;
 /// Rows beyond which the decomposition and the jackknife look at every so many.
 const ENOUGH_ROWS: usize = 3000;
 
@@ -63,6 +68,7 @@ pub(crate) fn identify(
     };
     let sense = campaign.angular_gain.map(f64::signum);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
+    let rates_alone = campaign.runs.iter().all(|run| run.recording.table_deg.is_none());
     let head = Head::of(&campaign);
     (options.progress)("preparing the runs");
     let mut left_out = Vec::new();
@@ -70,12 +76,14 @@ pub(crate) fn identify(
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
     }
     let mut runs = prepare(campaign, &mut left_out)?;
-    if !rate_gyroscope {
-        runs = believed(runs, stated, period, &mut left_out)?;
-    }
+    runs = if rate_gyroscope {
+        rate_runs::believed(runs, stated.unwrap_or(1.0), period, &mut left_out)?
+    } else {
+        believed(runs, stated, period, &mut left_out)?
+    };
     let (fitted, held) = apart(runs)?;
     if !rate_gyroscope {
-        require_a_turn(&fitted, stated.unwrap_or(1.0))?;
+        require_a_turn(&fitted, stated.unwrap_or(1.0), period)?;
     }
     if held.iter().map(SensorRun::len).sum::<usize>() < least_held_out(instrument) {
         return Err(Refusal::no_answer(
@@ -86,23 +94,26 @@ pub(crate) fn identify(
     }
     (options.progress)("choosing a model of the sensor");
     let mut finding = if rate_gyroscope {
-        rate_finding(stated, period, &fitted)?
+        rate_finding(stated, period, &fitted, &held)?
     } else {
-        sensor_finding(stated, sense, period, &fitted)?
+        sensor_finding(stated, sense, period, &fitted, &held, rates_alone)?
     };
     finding.warnings.extend(left_out);
     (options.progress)("measuring the held-out error");
     report(head, finding, &fitted, &held, with_plots)
 }
 
-fn require_a_turn(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
+fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
     let furthest = runs.iter().map(|r| r.travel_rad() * gain.abs()).fold(0.0, f64::max);
     if furthest < std::f64::consts::PI {
         let name = runs.first().map_or("campaign", |r| r.name.as_str());
         return Err(Refusal::new(
             name,
             format!("the angle turns through {:.1}° only", furthest.to_degrees()),
-            "at least half a turn (180°)",
+            match other_unit(runs, period) {
+                Some(unit) => format!("at least half a turn (180°); {unit}"),
+                None => "at least half a turn (180°)".into(),
+            },
         ));
     }
     Ok(())
@@ -117,30 +128,36 @@ fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
         Some(r) => Err(Refusal::no_answer(
             &r.name,
             format!("theta_deg does not follow the reference, which turns through {:.0}°", r.travel_rad().to_degrees()),
-            "the sensor's angle as theta_deg; of a rate in deg/s the integral is one: --map 'theta_deg=integral(COLUMN)'",
+            angle_in_another_unit(r).unwrap_or_else(|| {
+                "the sensor's angle as theta_deg; of a rate in deg/s the integral is one: --map 'theta_deg=integral(COLUMN)'".into()
+            }),
         )),
     }
 }
 
-fn sensor_finding(
-    stated: Option<f64>,
-    sense: Option<f64>,
-    period: f64,
-    runs: &[SensorRun],
-) -> Result<Finding<'static>, Refusal> {
-    let model = SensorModel::identify(stated, period, runs)?;
-    require_following(runs, model.sensor.gain)?;
-    let thinned = thinned(runs);
-    let deviations = deviations(&model, &thinned);
-    let described = Described { model: &model, deviations: &deviations };
-    let raw_turns = model.front().is_none_or(|r| {
+/// The raw angle turns, because the origin lies within what the channels draw.
+fn raw_turns(model: &SensorModel) -> bool {
+    model.front().is_none_or(|r| {
         let [x, y] = r.undo([0.0, 0.0]);
         r.kind == super::readout::Kind::Plain || x.hypot(y) < r.radius
-    });
-    let declared = model.front().map(|r| r.declared(raw_turns));
-    let neutral = model.outcome == Outcome::Neutral;
+    })
+}
+
+/// What has to be said of a model before its numbers.
+fn said_of(
+    model: &SensorModel,
+    stated: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    held: &[SensorRun],
+    rates_alone: bool,
+) -> Result<Vec<String>, Refusal> {
     let mut warnings = Vec::new();
-    if !raw_turns {
+    if stated.is_none() {
+        warnings.extend(model.sensor.doubts(rates_alone, runs)?);
+    }
+    warnings.extend(runs.iter().chain(held).filter_map(|run| jumps(run, &model.left(run), period)));
+    if !raw_turns(model) {
         warnings.push(
             "the readout's offsets exceed its amplitude, so that the raw angle does not turn: the ellipse was centred \
              first, and heldout.raw is null"
@@ -154,6 +171,26 @@ fn sensor_finding(
                 .into(),
         );
     }
+    Ok(warnings)
+}
+
+fn sensor_finding(
+    stated: Option<f64>,
+    sense: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    held: &[SensorRun],
+    rates_alone: bool,
+) -> Result<Finding<'static>, Refusal> {
+    let model = SensorModel::identify(stated, period, runs)?;
+    require_following(runs, model.sensor.gain)?;
+    let thinned = thinned(runs);
+    let deviations = deviations(&model, &thinned);
+    let described = Described { model: &model, deviations: &deviations };
+    let raw_turns = raw_turns(&model);
+    let declared = model.front().map(|r| r.declared(raw_turns));
+    let neutral = model.outcome == Outcome::Neutral;
+    let mut warnings = said_of(&model, stated, period, runs, held, rates_alone)?;
     let own = own_gain_ratios(&model, &thinned).into_iter();
     let all = described.gain_ratio();
     let all = all.map(|all| covering(all, "detection gain ratio", own, CONTRADICTS, &mut warnings));
@@ -170,7 +207,9 @@ fn sensor_finding(
         instrument: Instrument::Sensor,
         stated_gain: stated,
         reason: neutral.then(|| {
-            "nothing that was found predicts rows that were not fitted better than the sensor as it is".to_owned()
+            let unit =
+                runs.iter().find_map(angle_in_another_unit).map_or(String::new(), |unit| format!("; wanted: {unit}"));
+            format!("nothing that was found predicts rows that were not fitted better than the sensor as it is{unit}")
         }),
         angular_gain: described.angular_gain(stated),
         detection_gain_ratio: gain_ratio,
@@ -206,6 +245,38 @@ fn sensor_finding(
     })
 }
 
+/// What an angle of a sensor looks like whose values fill a turn in another unit than degrees.
+fn angle_in_another_unit(run: &SensorRun) -> Option<String> {
+    let Reading::Angle(theta) = &run.reading else { return None };
+    let values: Vec<f64> = theta.iter().map(|v| v.to_degrees()).collect();
+    let (size, largest) = (span(&values), values.iter().fold(f64::MIN, |m: f64, v| m.max(*v)));
+    let fills = |turn: f64| size <= turn && size > FILLED * turn;
+    let like = |unit: &str, by: String| {
+        format!("theta_deg in deg: it looks as if in {unit} (theta_deg = \"…{by}\" in [columns], or by --map)")
+    };
+    if fills(std::f64::consts::TAU) {
+        return Some(like("rad", "*57.29578".into()));
+    }
+    let bits = (largest + 1.0).log2().ceil();
+    let counts = values.iter().all(|v| (v - v.round()).abs() < 1e-6) && bits > 9.0 && fills(bits.exp2());
+    counts.then(|| like(&format!("counts of {bits:.0} bits"), format!("/{:.6}", bits.exp2() / 360.0)))
+}
+
+/// Says that the angle and its reference part from one row to the next and stay apart, where they do: each side then has a
+/// constant of its own.
+fn jumps(run: &SensorRun, left: &[f64], period: f64) -> Option<String> {
+    let found = slips(left, &vec![0.0; left.len()], period);
+    let first = found.first()?;
+    let more = if found.len() > 1 { format!(", the first of {} such jumps", found.len()) } else { String::new() };
+    Some(format!(
+        "{}: the angle and its reference part by {:.3}° at {:.3} s and stay apart{more}: a coupling that slipped, counts that were \
+         lost, or a table that was zeroed",
+        run.name,
+        first.by.to_degrees(),
+        run.t_s[first.at]
+    ))
+}
+
 /// A gain ratio with an interval that also covers its inverse: what it would be with the channels in each other's place.
 fn or_exchanged(ratio: Estimate) -> Estimate {
     let [low, high] = ratio.ci95;
@@ -231,7 +302,12 @@ fn counts_against(ratio: Option<Estimate>) -> String {
     )
 }
 
-fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Finding<'static>, Refusal> {
+fn rate_finding(
+    stated: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    held: &[SensorRun],
+) -> Result<Finding<'static>, Refusal> {
     let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
         Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
     })?;
@@ -267,6 +343,7 @@ fn rate_finding(stated: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<
         warnings
             .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
     }
+    warnings.extend(runs.iter().chain(held).filter_map(|run| rate_runs::parting(run, &model.left(run), model.late_s)));
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
@@ -372,7 +449,7 @@ fn take_apart(samples: &[Sample], runs: &[SensorRun], cycles: f64, gain: f64) ->
         vec![Influence { of: "pattern", columns: position.collect() }, Influence { of: "time", columns: time }];
     let rates = column(&|s| s.rate);
     let fastest = median(&mut rates.iter().map(|r| r.abs()).collect::<Vec<_>>());
-    let spread = super::samples::span(&rates);
+    let spread = span(&rates);
     if spread > 0.1 * fastest && fastest > 0.0 {
         influences.push(Influence { of: "rate", columns: vec![rates.clone()] });
     }

@@ -10,6 +10,8 @@ use crate::recording::Run;
 
 /// Parts of a run whose increments tell how far the angle goes with the reference.
 const PARTS: usize = 50;
+/// Jumps into rows so close to each other are one.
+const TOGETHER: usize = 2;
 /// Rows on either side of a jump that tell how far a step usually goes.
 const BESIDE: usize = 12;
 
@@ -25,7 +27,7 @@ pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
     };
     let Some(gain) = gain(&theta, &reference) else { return Vec::new() };
     let expected: Vec<f64> = reference.iter().map(|a| gain * a).collect();
-    let mut said = Vec::new();
+    let mut jumps: Vec<Jump> = Vec::new();
     for slip in slips(&theta, &expected, period) {
         let row = settled.start + slip.at;
         let is_table = r.table_deg.is_some() && unusual(&expected, slip.at) > unusual(&theta, slip.at);
@@ -35,15 +37,31 @@ pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
             _ => continue,
         };
         column[row..].iter_mut().for_each(|v| *v -= by.to_degrees());
-        said.push(format!(
-            "{}: {name} jumps by {:.3}° from row {row} to row {}, at {:.3} s, and nothing turned by that; the jump is left out",
+        match jumps.last_mut() {
+            Some(last) if last.name == name && row - last.rows[1] <= TOGETHER => {
+                last.rows[1] = row;
+                last.by += by;
+            }
+            _ => jumps.push(Jump { name, rows: [row; 2], by }),
+        }
+    }
+    let said = |Jump { name, rows: [first, last], by }: &Jump| {
+        format!(
+            "{}: {name} jumps by {:.3}° from row {first} to row {}, at {:.3} s, and nothing turned by that; the jump is left out",
             run.file.display(),
             by.to_degrees(),
-            row + 1,
-            r.t_s[row]
-        ));
-    }
-    said
+            last + 1,
+            run.recording.t_s[*first]
+        )
+    };
+    jumps.iter().map(said).collect()
+}
+
+/// A jump of a column: into the first of these rows to the last.
+struct Jump {
+    name: &'static str,
+    rows: [usize; 2],
+    by: f64,
 }
 
 fn radians(degrees: &[f64], period: f64) -> Vec<f64> {

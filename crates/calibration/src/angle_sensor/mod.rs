@@ -1,5 +1,6 @@
 //! Angle sensors: two channels that read a sine and a cosine, or an angle, against a reference. Resolvers, Hall pairs,
 //! encoders, magnetometers, interferometers.
+mod agreement;
 mod autoregression;
 mod cross_validation;
 pub(crate) mod curve;
@@ -13,6 +14,7 @@ mod lines;
 pub(crate) mod model;
 mod rails;
 pub(crate) mod rate_gyroscope;
+mod rate_runs;
 mod readout;
 mod readout_fit;
 pub(crate) mod reference_free;

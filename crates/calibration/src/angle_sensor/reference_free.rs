@@ -4,6 +4,7 @@
 
 use std::f64::consts::TAU;
 
+use super::agreement::of_one_sensor;
 use super::cross_validation::{Candidate, Folds, Tolerance, choose, losses_of_radius};
 use super::curve::{Curve, mean_radius, undone};
 use super::deviations::{jackknife, other_noise, without_block};
@@ -12,11 +13,11 @@ use super::ellipse;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, fit};
-use super::samples::{SensorRun, apart, unwrapped};
+use super::samples::{SensorRun, apart, span, unwrapped};
 use crate::data::track::wrapped;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::error::Refusal;
-use crate::estimation::statistics::line;
+use crate::estimation::statistics::{line, median, robust_deviation};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::recording::{Campaign, Instrument, Reference, Run};
 use crate::report::calibration::{Calibration, Provenance};
@@ -34,6 +35,10 @@ const LARGEST_GAP_DEG: f64 = 180.0;
 const LARGEST_GAP_OF_A_CUBIC_DEG: f64 = 60.0;
 /// What the best curve may leave of the radius, rms: engineering choice.
 const LARGEST_LEFT: f64 = 0.25;
+
+/// Parts of a run whose amplitudes are compared, and by how much they differ at least where it is said.
+const PARTS: usize = 8;
+const LEAST_CHANGE: f64 = 5e-3;
 
 /// What two channels told without a reference.
 #[derive(Debug, Clone)]
@@ -70,7 +75,8 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
-    let (fitted, held) = apart(runs.collect::<Result<_, _>>()?)?;
+    let mut warnings = Vec::new();
+    let (fitted, held) = apart(of_one_sensor(runs.collect::<Result<_, _>>()?, &mut warnings)?)?;
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
         return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));
@@ -105,6 +111,8 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let mut effects = if neutral { Vec::new() } else { readout_effects(&readout, deviations, &evidence) };
     provenance::in_unit(&mut effects, provenance.readout_unit.as_deref());
     let calibration = Calibration { device, hypothesis, provenance };
+    warnings.extend(fitted.iter().filter_map(|run| amplitude_that_changes(&readout, run)));
+    warnings.extend(unseen(raw_turns, &readout));
     calibration_stands(&calibration)?;
     Ok(Told {
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -118,7 +126,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
             largest_gap_deg,
         },
         calibration,
-        warnings: unseen(raw_turns, &readout),
+        warnings,
         curve: Curve::new(&readout, &held),
     })
 }
@@ -226,8 +234,31 @@ fn constancy(readout: &Readout, runs: &[SensorRun]) -> Constancy {
     Constancy { rms: (square / f64::max(n, 1.0)).sqrt(), peak }
 }
 
+/// Says that the amplitude changes in the course of a run by more than the rest of what is left, where it does: no readout
+/// makes that, and what was found is of the mean.
+fn amplitude_that_changes(readout: &Readout, run: &SensorRun) -> Option<String> {
+    let radii: Vec<f64> = undone(readout, std::slice::from_ref(run)).map(|[x, y]| x.hypot(y)).collect();
+    if radii.len() < PARTS * FEWEST_ROWS {
+        return None;
+    }
+    let parts = radii.chunks(radii.len().div_ceil(PARTS));
+    let middles: Vec<f64> = parts.clone().map(|part| median(&mut part.to_vec())).collect();
+    let mut within: Vec<f64> =
+        parts.zip(&middles).map(|(part, middle)| robust_deviation(part.iter().map(|r| r - middle))).collect();
+    let change = span(&middles) / median(&mut middles.clone());
+    let rest = median(&mut within) / median(&mut middles.clone());
+    (change > LEAST_CHANGE.max(rest)).then(|| {
+        format!(
+            "{}: the amplitude changes by {:.1} % in the course of the run, which no readout makes: its gap, its light or its \
+             supply does; what was found is of the mean, and its intervals are as wide as that makes them",
+            run.name,
+            100.0 * change
+        )
+    })
+}
+
 /// The largest part of the turn that no row is in, rad.
-fn largest_gap(readout: &Readout, runs: &[SensorRun]) -> f64 {
+pub(super) fn largest_gap(readout: &Readout, runs: &[SensorRun]) -> f64 {
     let mut angles: Vec<f64> = undone(readout, runs).map(|[x, y]| y.atan2(x)).collect();
     angles.sort_by(f64::total_cmp);
     let ends = angles.first().zip(angles.last()).map_or(TAU, |(first, last)| first + TAU - last);

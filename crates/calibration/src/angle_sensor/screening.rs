@@ -1,6 +1,7 @@
 //! Which runs of a sensor can be believed: each by itself, before all are fitted at once, is read by two channels, follows its
 //! reference, and turns as far as the others do and the same way. What is odd in a few is left out, and named.
 
+use super::agreement::of_one_sensor;
 use super::ellipse;
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun, unwrapped};
@@ -42,7 +43,7 @@ pub(crate) fn believed(
     period: f64,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<SensorRun>, Refusal> {
-    let runs = without_copied_rows(runs, warnings)?;
+    let runs = of_one_sensor(without_copied_rows(runs, warnings)?, warnings)?;
     let follows: Vec<Follows> = runs.iter().map(|r| follows(r, stated, period)).collect();
     let mut told: Vec<f64> =
         follows.iter().filter_map(|f| if let Follows::Turns(g) = f { Some(*g) } else { None }).collect();

@@ -15,6 +15,17 @@ const WHOLE: f64 = 0.02;
 /// Samples whose circular mean begins the unwrapping of an error.
 const BEGINNING: usize = 50;
 
+/// Rows so many periods apart may have gone the other way between them; other gains are tried up to so many periods between
+/// rows, and fit alike where they leave up to so many times as much.
+const COARSE: f64 = 0.25;
+const ALIASES: i32 = 3;
+const ALIKE: f64 = 1.5;
+/// Units in which a reference is taken for degrees, and what one is in degrees; those that make a whole number of whole ones.
+const UNITS: [(&str, f64); 3] = [("rad", 57.295_779_513), ("gon", 0.9), ("arc minutes", 1.0 / 60.0)];
+const WHOLE_UNITS: [(&str, f64); 2] = [("turns", 360.0), ("turns per minute", 6.0)];
+/// A gain is one of a unit within this share.
+const SAME_UNIT: f64 = 1e-3;
+
 /// A sensor as it is taken before its errors are known: θ = gain · reference + constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sensor {
@@ -57,6 +68,60 @@ impl Sensor {
         let sensor = Self { gain: size, free_gain: !whole, period, cycles: TAU / period };
         let opposite = sensor.misfit(runs, -size) < sensor.misfit(runs, size);
         Ok(if opposite { Self { gain: -size, ..sensor } } else { sensor })
+    }
+
+    /// The angular gains, by periods between two rows, that fit about as well as this one: where the rows stand evenly, and so
+    /// far apart that they do not show which way the angle went between them.
+    fn aliases(&self, runs: &[SensorRun]) -> Vec<f64> {
+        let step = coarsest_step(runs);
+        if step * self.gain.abs() < COARSE * self.period {
+            return Vec::new();
+        }
+        let most = ALIKE * self.misfit(runs, self.gain);
+        let others = (-ALIASES..=ALIASES).filter(|n| *n != 0).map(|n| self.gain + f64::from(n) * self.period / step);
+        others.filter(|gain| self.misfit(runs, *gain) <= most).collect()
+    }
+
+    /// What has to be said of a gain that the data alone say: a sensor that is bolted to its reference has a whole number of
+    /// periods a turn.
+    ///
+    /// # Errors
+    /// Where it has none, and a whole number fits as well.
+    pub(crate) fn doubts(&self, rates_alone: bool, runs: &[SensorRun]) -> Result<Option<String>, Refusal> {
+        let (gain, aliases) = (self.gain.abs(), self.aliases(runs));
+        let nearest = |gains: &mut dyn Iterator<Item = f64>| gains.min_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let is_whole = |gain: &f64| (gain - gain.round()).abs() < WHOLE && gain.abs() > 0.5;
+        if self.free_gain
+            && let Some(whole) = nearest(&mut aliases.iter().copied().filter(is_whole))
+        {
+            return Err(Refusal::no_answer(
+                "campaign",
+                format!(
+                    "the angle turns by {:.0}° from row to row at an even speed: {gain:.4} periods a turn fit, and {:.0} as well",
+                    (coarsest_step(runs) * gain).to_degrees(),
+                    whole.abs()
+                ),
+                format!("pole_pairs in campaign.toml, or rows less than {:.0}° of the angle apart", 90.0),
+            ));
+        }
+        if self.free_gain {
+            let unit = unit_of(gain, &UNITS).unwrap_or_else(|| "the reference is in another unit".into());
+            return Ok(Some(format!(
+                "{gain:.4} periods a turn is no whole number: {unit}, or there is a gear between them, which angular_gain in \
+                 campaign.toml states"
+            )));
+        }
+        if let Some(other) = nearest(&mut aliases.iter().copied()) {
+            return Ok(Some(format!(
+                "the angle turns by {:.0}° from row to row at an even speed, so that {gain:.0} periods a turn and {:.2} look alike: \
+                 the smaller was taken, and its sense; pole_pairs and angular_gain in campaign.toml state them",
+                (coarsest_step(runs) * gain).to_degrees(),
+                other.abs()
+            )));
+        }
+        Ok(unit_of(gain, &WHOLE_UNITS[1..]).filter(|_| rates_alone).map(|unit| {
+            format!("{gain:.0} periods a turn were taken from rate_dps alone; or {unit}: table_deg, or pole_pairs, would tell")
+        }))
     }
 
     /// Harmonics of the angle per turn of the reference.
@@ -103,6 +168,28 @@ impl Sensor {
         }
         out
     }
+}
+
+/// The unit, of these, in which a reference makes a whole number of periods a turn this gain, in words.
+fn unit_of(gain: f64, units: &[(&str, f64)]) -> Option<String> {
+    let of = |(name, degrees): &(&str, f64)| {
+        let periods = gain / degrees;
+        ((periods / periods.round() - 1.0).abs() < SAME_UNIT && periods > 0.5).then(|| {
+            format!(
+                "it looks as if the reference were in {name} (\"…*{degrees:.7}\" in [columns], or by --map), with {:.0} periods a turn",
+                periods.round()
+            )
+        })
+    };
+    units.iter().find_map(of)
+}
+
+/// What a reference that hardly turns looks like, while the angle goes round: a unit in which it would.
+pub(crate) fn other_unit(runs: &[SensorRun], period: f64) -> Option<String> {
+    let turns = |run: &SensorRun| magnitude(std::slice::from_ref(run), period) * run.travel_rad() / period;
+    let gain = magnitude(runs, period);
+    let units = [UNITS, [WHOLE_UNITS[0], WHOLE_UNITS[1], UNITS[0]]].concat();
+    unit_of(gain, &units).filter(|_| runs.iter().any(|run| turns(run) > 1.0))
 }
 
 /// An error followed through its period from the circular mean of its first samples on, about its median.

@@ -9,6 +9,7 @@ use crate::data::slips::slips;
 use crate::data::track::{Track, run_name, wrapped};
 use crate::error::Refusal;
 use crate::estimation::initial_guess::{Guess, Motion, bearings, motion};
+use crate::estimation::statistics::median;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::{Instrument, Role, Run};
 use crate::report::RunReport;
@@ -21,6 +22,10 @@ const MOST_BROKEN: f64 = 0.5;
 const FEWEST_LEFT: usize = 2;
 /// A run with more slips than this has no clock.
 const MOST_SLIPS: usize = 8;
+/// Amplitudes in one unit, each over its relative set amplitude, are within this factor: a thousand is the next unit.
+const SAME_AMPLITUDE: f64 = 30.0;
+/// Samples of a run that tell its amplitude.
+const LOOKED_AT: usize = 1000;
 /// An angle that scatters by more than this share of its period about its line does not follow the input.
 const LOST: f64 = 0.2;
 
@@ -46,6 +51,39 @@ pub(crate) fn stated(gain: &Option<f64>) -> Result<Option<f64>, Refusal> {
         }
         other => Ok(*other),
     }
+}
+
+/// Says no where a run is read in another unit than the others: in volts of one, a thousandth of another is no amplitude.
+///
+/// # Errors
+/// Where one is.
+fn require_one_unit(runs: &[Run]) -> Result<(), Refusal> {
+    let sizes: Vec<Option<f64>> = runs.iter().map(|r| Some(amplitude(r)? / r.amplitude.unwrap_or(1.0))).collect();
+    let mut told: Vec<f64> = sizes.iter().flatten().copied().filter(|size| *size > 0.0).collect();
+    if told.len() < 2 {
+        return Ok(());
+    }
+    let usual = median(&mut told);
+    let odd = |size: &Option<f64>| size.filter(|size| *size > 0.0 && (size / usual).ln().abs() > SAME_AMPLITUDE.ln());
+    let Some((run, size)) = runs.iter().zip(&sizes).find_map(|(run, size)| Some((run, odd(size)?))) else {
+        return Ok(());
+    };
+    Err(Refusal::no_answer(
+        &run_name(run),
+        format!("its readout's amplitude is {size:.3e}, that of the other runs {usual:.3e}"),
+        "every run in one unit, as xc_v = \"…*0.001\" in [columns] takes mV to V; or `amplitude` of a run that was set to another",
+    ))
+}
+
+/// The usual size of what both channels read.
+fn amplitude(run: &Run) -> Option<f64> {
+    let r = &run.recording;
+    let (x, y) = (r.xc_v.as_ref()?, r.yc_v.as_ref()?);
+    let part = |v: &Option<Vec<f64>>, i: usize| v.as_ref().map_or(0.0, |v| v[i]);
+    let stride = (x.len() / LOOKED_AT).max(1);
+    let size = |i: usize| x[i].hypot(y[i]).hypot(part(&r.xs_v, i).hypot(part(&r.ys_v, i)));
+    let mut sizes: Vec<f64> = (0..x.len()).step_by(stride).map(size).filter(|size| size.is_finite()).collect();
+    (!sizes.is_empty()).then(|| median(&mut sizes))
 }
 
 impl Screen {
@@ -96,6 +134,7 @@ impl Screen {
                 None => sound.push(run),
             }
         }
+        require_one_unit(&sound)?;
         let fitted = sound.iter().filter(|r| r.role == Role::Fit).count();
         let too_many = fitted == 0 || broken.len() as f64 > MOST_BROKEN * self.rotations as f64;
         if let Some((_, name, what)) = broken.first().filter(|_| too_many) {

@@ -1,0 +1,128 @@
+//! Whether the runs of two channels are of one sensor: what each draws by itself, held against what the others draw. No
+//! reference is asked for.
+
+use super::curve::{mean_radius, undone};
+use super::ellipse;
+use super::readout::Readout;
+use super::reference_free::largest_gap;
+use super::samples::{SensorRun, span};
+use crate::error::Refusal;
+
+/// Share of the runs that may be left out.
+const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
+/// A part of the turn this long without a row leaves an ellipse to be guessed, rad.
+const LARGEST_GAP: f64 = std::f64::consts::PI;
+/// Rows of a run that are looked at.
+const ENOUGH_ROWS: usize = 1000;
+/// With another run's ellipse undone the radius is off by less than this share, rms, which is an angle error of a degree …
+const SAME_CURVE: f64 = 0.02;
+/// … or by less than so many times what its own ellipse leaves.
+const SAME_LEFT: f64 = 5.0;
+/// Amplitudes of one sensor in one unit are within this factor: a thousand is the next unit.
+const SAME_AMPLITUDE: f64 = 30.0;
+/// A channel stands still where it moves by less than this share of the other.
+const STILL: f64 = 1e-6;
+
+/// What a run draws by itself.
+struct Own {
+    run: SensorRun,
+    readout: Readout,
+    amplitude: f64,
+    left: f64,
+}
+
+impl Own {
+    fn new(run: &SensorRun) -> Option<Self> {
+        let run = run.thinned((run.len() / ENOUGH_ROWS).max(1));
+        let readout = ellipse::algebraic(std::slice::from_ref(&run))?;
+        if largest_gap(&readout, std::slice::from_ref(&run)) > LARGEST_GAP {
+            return None;
+        }
+        let (left, amplitude) = (off(&readout, &run), readout.amplitude);
+        Some(Self { run, readout, amplitude, left })
+    }
+
+    /// How far the radius of either is off with the ellipse of the other undone, and whether that is one sensor's.
+    fn beside(&self, other: &Self) -> (f64, bool) {
+        let across = off(&self.readout, &other.run).max(off(&other.readout, &self.run));
+        (across, across <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left)))
+    }
+
+    fn times(&self, other: &Self) -> f64 {
+        self.amplitude / other.amplitude
+    }
+
+    fn agrees(&self, other: &Self) -> bool {
+        self.times(other).ln().abs() <= SAME_AMPLITUDE.ln() && self.beside(other).1
+    }
+
+    /// Why it does not agree with another.
+    fn against(&self, other: &Self) -> String {
+        let times = self.times(other);
+        if times.ln().abs() > SAME_AMPLITUDE.ln() {
+            return format!(
+                "its amplitude is {:.4e}, that of {} is {:.4e}: one of them is in another unit",
+                self.amplitude, other.run.name, other.amplitude
+            );
+        }
+        format!(
+            "its channels do not draw what those of {} do: with the ellipse of the other undone the radius is off by {:.2} %, \
+             with its own by {:.2} %",
+            other.run.name,
+            100.0 * self.beside(other).0,
+            100.0 * self.left
+        )
+    }
+}
+
+/// rms of the radius about its mean, as a share of it, with a readout undone.
+fn off(readout: &Readout, run: &SensorRun) -> f64 {
+    let run = std::slice::from_ref(run);
+    let mean = mean_radius(readout, run);
+    let (n, square) =
+        undone(readout, run).fold((0.0, 0.0), |(n, s), [x, y]| (n + 1.0, s + (x.hypot(y) / mean - 1.0).powi(2)));
+    (square / f64::max(n, 1.0)).sqrt()
+}
+
+/// The runs that are of one sensor; those that are not are left out by name.
+///
+/// # Errors
+/// Where too few agree to say which are right, or a channel stands still in all.
+pub(super) fn of_one_sensor(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Result<Vec<SensorRun>, Refusal> {
+    let owns: Vec<Option<Own>> = runs.iter().map(Own::new).collect();
+    let told: Vec<&Own> = owns.iter().flatten().collect();
+    let friends = |own: &Own| told.iter().filter(|other| own.agrees(other)).count();
+    let usual = told.iter().rev().max_by_key(|own| friends(own));
+    let why = |(run, own): (&SensorRun, &Option<Own>)| match (own, usual) {
+        _ if still(run).is_some() => still(run),
+        (Some(own), Some(usual)) if !own.agrees(usual) => Some(own.against(usual)),
+        _ => None,
+    };
+    let why: Vec<Option<String>> = runs.iter().zip(&owns).map(why).collect();
+    let odd: Vec<usize> = (0..runs.len()).filter(|&i| why[i].is_some()).collect();
+    if let Some(&first) = odd.first().filter(|_| odd.len() as f64 > MOST_LEFT_OUT * runs.len() as f64) {
+        let wanted = if still(&runs[first]).is_some() {
+            "two channels that read a cosine and a sine"
+        } else {
+            "runs of one sensor in one unit, each channel in its place; or each sensor as a campaign of its own"
+        };
+        return Err(Refusal::no_answer(&runs[first].name, why[first].clone().unwrap_or_default(), wanted));
+    }
+    let said =
+        runs.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?)));
+    warnings.extend(said);
+    Ok(runs.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
+}
+
+/// A channel that stands still while the other moves.
+fn still(run: &SensorRun) -> Option<String> {
+    let (x, y): (Vec<f64>, Vec<f64>) = run.channels()?.iter().map(|z| (z[0], z[1])).unzip();
+    let spans = [span(&x), span(&y)];
+    let stands = |own: usize| spans[own] <= STILL * spans[1 - own];
+    let (name, at) = match (stands(0), stands(1)) {
+        (true, false) => ("xc_v", x.first()?),
+        (false, true) => ("yc_v", y.first()?),
+        _ => return None,
+    };
+    Some(format!("{name} stands still, at {at}, while the other channel moves"))
+}

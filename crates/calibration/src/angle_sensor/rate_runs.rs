@@ -1,0 +1,270 @@
+//! Which runs of a rate gyroscope can be believed, each by itself and beside the others, and where in a run its angle and its
+//! reference part by what neither bias, scale factor nor lag makes.
+
+use super::samples::{Reading, SensorRun, span, unwrapped};
+use crate::error::Refusal;
+use crate::estimation::linear::NormalEquations;
+use crate::estimation::statistics::{median, robust_deviation};
+use crate::report::gate::unit;
+
+/// Share of the runs that may be left out.
+const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
+/// Scale factors of one gyroscope are within this share of each other.
+const SHARE: f64 = 0.05;
+/// Rates are one value within this share of the fastest; a range ends where so many rows stand there …
+const SAME_RATE: f64 = 1e-6;
+const ROWS_AT_THE_END: usize = 5;
+/// … while the reference goes on by this share of it.
+const GOES_ON: f64 = 0.01;
+/// Share of the variance of the reference beside a line in time from which on a run tells its scale factor.
+const TOLD_FROM_A_LINE: f64 = 1e-3;
+/// A parting stands out of the noise of the rate by so many deviations, is this share of all that is left, takes at most this
+/// share of the run, and is this large at least, rad.
+const STANDS_OUT: f64 = 10.0;
+const MOST_OF_IT: f64 = 0.5;
+const LONGEST_SHARE: f64 = 0.125;
+const LEAST: f64 = 1e-3;
+
+/// The runs that can be believed, of a gyroscope of this nominal scale factor and an angle of this period, rad; those that cannot are left out by name.
+///
+/// # Errors
+/// Where too few are left, or the runs contradict each other.
+pub(super) fn believed(
+    runs: Vec<SensorRun>,
+    scale: f64,
+    period: f64,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorRun>, Refusal> {
+    if let Some(run) = runs.iter().find(|run| steps(run).is_some_and(|mut steps| median(&mut steps) > 0.5 * period)) {
+        return Err(Refusal::no_answer(
+            &run.name,
+            "theta_deg turns by more than half a period from row to row",
+            "t_s in seconds: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map); or rows closer together",
+        ));
+    }
+    let gains: Vec<Option<f64>> = runs.iter().map(|run| gain(run, period)).collect();
+    let mut told: Vec<f64> = gains.iter().flatten().copied().collect();
+    let common = if told.is_empty() { scale } else { median(&mut told) };
+    if !(0.5..2.0).contains(&(common / scale).abs()) {
+        return Err(Refusal::no_answer(
+            "campaign",
+            format!(
+                "the angle turns {common:.4} times as far as the reference, and the scale factor should be near {scale}"
+            ),
+            unit(common, Some(scale)).unwrap_or("rates in deg/s, angles in deg and times in s"),
+        ));
+    }
+    let why = |(run, gain): (&SensorRun, &Option<f64>)| {
+        end_of_range(run, period).or_else(|| {
+            let gain = gain.filter(|gain| (gain / common - 1.0).abs() > SHARE)?;
+            Some(format!(
+                "its angle turns {gain:.4} times as far as the reference, that of the other runs {common:.4} times"
+            ))
+        })
+    };
+    let why: Vec<Option<String>> = runs.iter().zip(&gains).map(why).collect();
+    let odd = why.iter().flatten().count();
+    if odd as f64 > MOST_LEFT_OUT * runs.len() as f64
+        && let Some((run, why)) = runs.iter().zip(&why).find_map(|(run, why)| Some((run, why.as_ref()?)))
+    {
+        let wanted = "runs of one gyroscope within its range, each with its own reference";
+        return Err(Refusal::no_answer(&run.name, why.clone(), wanted));
+    }
+    warnings.extend(
+        runs.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?))),
+    );
+    Ok(runs.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
+}
+
+fn angle(run: &SensorRun) -> Option<&[f64]> {
+    if let Reading::Angle(theta) = &run.reading { Some(theta) } else { None }
+}
+
+/// The angle, followed through its period.
+fn followed(run: &SensorRun, period: f64) -> Option<Vec<f64>> {
+    Some(unwrapped(angle(run)?.iter().copied(), period))
+}
+
+fn steps(run: &SensorRun) -> Option<Vec<f64>> {
+    Some(angle(run)?.windows(2).map(|w| (w[1] - w[0]).abs()).collect()).filter(|steps: &Vec<f64>| !steps.is_empty())
+}
+
+/// Scale factor of one run beside a bias of its own; none where they are not told apart.
+fn gain(run: &SensorRun, period: f64) -> Option<f64> {
+    let theta = &followed(run, period)?;
+    let n = run.len() as f64;
+    let middle = |v: &[f64]| v.iter().sum::<f64>() / n;
+    let middles = [middle(&run.reference_rad), middle(&run.t_s), middle(theta)];
+    let mut equations = NormalEquations::new(2);
+    let mut moments = [0.0; 3];
+    for ((a, t), theta) in run.reference_rad.iter().zip(&run.t_s).zip(theta) {
+        let (a, t) = (a - middles[0], t - middles[1]);
+        equations.add(&[a, t], theta - middles[2]);
+        moments = [moments[0] + a * a, moments[1] + a * t, moments[2] + t * t];
+    }
+    let beside_a_line = 1.0 - moments[1].powi(2) / (moments[0] * moments[2]).max(f64::MIN_POSITIVE);
+    (moments[0] > 0.0 && beside_a_line > TOLD_FROM_A_LINE).then(|| equations.solve()[0]).filter(|gain| *gain != 0.0)
+}
+
+/// Says that the rate stands at one value while the reference turns faster, where it does.
+fn end_of_range(run: &SensorRun, period: f64) -> Option<String> {
+    let theta = followed(run, period)?;
+    let rates: Vec<f64> = theta
+        .windows(2)
+        .zip(run.t_s.windows(2))
+        .map(|(a, t)| (a[1] - a[0]) / (t[1] - t[0]).max(f64::MIN_POSITIVE))
+        .collect();
+    let reference = |i: usize| {
+        (run.reference_rad[i + 1] - run.reference_rad[i]) / (run.t_s[i + 1] - run.t_s[i]).max(f64::MIN_POSITIVE)
+    };
+    let fastest = rates.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    for sign in [1.0, -1.0] {
+        let end = rates.iter().map(|r| sign * r).fold(0.0, f64::max);
+        let there: Vec<usize> = (0..rates.len()).filter(|&i| end - sign * rates[i] < SAME_RATE * fastest).collect();
+        if there.len() < ROWS_AT_THE_END {
+            continue;
+        }
+        let beside: Vec<f64> = there.iter().map(|&i| reference(i).abs()).collect();
+        if span(&beside) > GOES_ON * end {
+            return Some(format!(
+                "its rate stands at {:.4} deg/s in {} rows while the reference goes on: its range ends there",
+                (sign * end).to_degrees(),
+                there.len()
+            ));
+        }
+    }
+    None
+}
+
+/// Says where in a run the angle and its reference part by most of what is `left`, where that is a short part of it; or that
+/// they do all along, by more than noise of the rate makes. The reference was taken `late_s` earlier, which it does not tell
+/// at one end of the run.
+pub(super) fn parting(run: &SensorRun, left: &[f64], late_s: f64) -> Option<String> {
+    let (first, last) = (run.t_s.first()?, run.t_s.last()?);
+    let begin = run.t_s.partition_point(|t| t - late_s < *first);
+    let end = run.t_s.partition_point(|t| t - late_s <= *last);
+    let (left, t_s) = (left.get(begin..end)?, &run.t_s[begin..end]);
+    let n = left.len();
+    let steps: Vec<f64> = left.windows(2).map(|w| w[1] - w[0]).collect();
+    let all = span(left);
+    let usual = robust_deviation(steps.iter().copied());
+    if all < LEAST || usual <= 0.0 {
+        return None;
+    }
+    let longest = LONGEST_SHARE * n as f64;
+    let widths = std::iter::successors(Some(1usize), |w| Some(2 * w)).take_while(|w| *w as f64 <= longest);
+    let widest = |w: usize| (0..n - w).map(move |i| (i, w, left[i + w] - left[i]));
+    let stands_out = |&(_, w, by): &(usize, usize, f64)| by.abs() / (usual * (w as f64).sqrt());
+    let most = |p: &(usize, usize, f64)| p.2.abs() > MOST_OF_IT * all && stands_out(p) > STANDS_OUT;
+    let found = widths.flat_map(widest).filter(most).max_by(|a, b| stands_out(a).total_cmp(&stands_out(b)));
+    if let Some((at, over, by)) = found {
+        return Some(format!(
+            "{}: from {:.2} s to {:.2} s the angle and its reference part by {:.3}°, which is most of what is left and neither bias, \
+             scale factor nor lag: a coupling that slipped, values that stood still, rows that are missing, or a range that ended",
+            run.name,
+            t_s[at],
+            t_s[at + over],
+            by.to_degrees()
+        ));
+    }
+    (all > STANDS_OUT * usual * (n as f64).sqrt()).then(|| {
+        format!(
+            "{}: the angle and its reference part by {:.3}° in the course of the run, which neither bias, scale factor nor lag makes \
+             and noise of the rate does not: a bias or a scale factor that changes, with the temperature for one",
+            run.name,
+            all.to_degrees()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Role;
+
+    /// A minute at 100 Hz of a gyroscope with this scale factor, whose rate ends at `range`, rad/s, turned there and back.
+    fn run(name: &str, gain: f64, range: f64) -> SensorRun {
+        let t_s: Vec<f64> = (0..6000).map(|i| 0.01 * f64::from(i)).collect();
+        let rate = |t: f64| 1.5 * (0.7 * t).sin();
+        let sum = |f: &dyn Fn(f64) -> f64| {
+            t_s.iter()
+                .scan(0.0, |angle, t| {
+                    *angle += 0.01 * f(*t);
+                    Some(*angle)
+                })
+                .collect::<Vec<f64>>()
+        };
+        SensorRun {
+            name: name.into(),
+            number: 0,
+            role: Role::Fit,
+            commanded: false,
+            reference_rad: sum(&rate),
+            rate_rad_s: t_s.iter().map(|t| rate(*t)).collect(),
+            acceleration_rad_s2: vec![0.0; t_s.len()],
+            reading: Reading::Angle(sum(&|t| (gain * rate(t) + 0.006).clamp(-range, range))),
+            t_s,
+        }
+    }
+
+    fn told(runs: &[SensorRun]) -> Result<Vec<String>, Refusal> {
+        let mut warnings = Vec::new();
+        believed(runs.to_vec(), 1.0, std::f64::consts::TAU, &mut warnings).map(|_| warnings)
+    }
+
+    #[test]
+    fn a_run_that_turns_the_other_way_is_named_and_of_two_neither_is_right() {
+        let runs = [run("a", 1.02, 9.0), run("b", 1.02, 9.0), run("c", -1.02, 9.0)];
+        let warnings = told(&runs).expect("two that agree");
+        assert!(
+            warnings.len() == 1 && warnings[0].starts_with("c: left out: its angle turns -1.0200 times"),
+            "{warnings:?}"
+        );
+        assert!(told(&runs[1..]).is_err() && told(&runs[..2]).expect("alike").is_empty());
+    }
+
+    #[test]
+    fn a_range_that_ends_is_no_scale_factor() {
+        let refusal = told(&[run("a", 1.02, 1.3)]).expect_err("a rate that stands");
+        assert!(refusal.to_string().contains("its rate stands at 74.48"), "{refusal}");
+        assert!(told(&[run("a", 1.02, 9.0)]).expect("its whole range").is_empty());
+    }
+
+    #[test]
+    fn a_rate_in_another_unit_is_named() {
+        assert!(
+            told(&[run("a", 5.88, 99.0)])
+                .expect_err("six times")
+                .to_string()
+                .contains("as if in revolutions per minute")
+        );
+    }
+
+    #[test]
+    fn milliseconds_taken_for_seconds_are_named() {
+        let mut run = run("a", 1.0, 9.0);
+        let Reading::Angle(theta) = &mut run.reading else { unreachable!() };
+        theta.iter_mut().for_each(|v| *v *= 1e3);
+        assert!(told(&[run]).expect_err("turns of its own").to_string().contains("as if in ms"));
+    }
+
+    #[test]
+    fn where_a_run_parts_from_its_reference_is_told_and_a_walk_does_not() {
+        let run = run("a", 1.0, 9.0);
+        let noise = |i: usize| ((i as f64 * 12.9898).sin() * 43_758.545_3).fract();
+        let walk: Vec<f64> = (0..run.len())
+            .scan(0.0, |sum, i| {
+                *sum += 1e-4 * noise(i);
+                Some(*sum)
+            })
+            .collect();
+        assert_eq!(parting(&run, &walk, 0.0), None);
+        let slipped: Vec<f64> =
+            walk.iter().enumerate().map(|(i, w)| w + 0.05 * ((i as f64 - 3000.0) / 30.0).clamp(0.0, 1.0)).collect();
+        let said = parting(&run, &slipped, 0.0).expect("thirty rows");
+        let drifts: Vec<f64> = walk.iter().enumerate().map(|(i, w)| w + 1e-8 * (i as f64).powi(2)).collect();
+        let slowly = parting(&run, &drifts, 0.0).expect("a rate that changes");
+        assert!(slowly.contains("in the course of the run"), "{slowly}");
+        assert!(said.starts_with("a: from 30.00 s to 30.32 s") || said.starts_with("a: from 29.9"), "{said}");
+    }
+}
