@@ -20,13 +20,7 @@ mod table;
 /// Takes one measurement as the cycle does.
 fn measure<T: Float>(ud: &mut Ud<T>, h: &[T; N], noise: T) -> [T; N] {
     let mut update = Update::idle();
-    for j in 0..N {
-        ud.project(&mut update, h, j);
-    }
-    ud.open(&mut update, noise);
-    for j in 0..N {
-        ud.absorb(&mut update, j);
-    }
+    ud.measure(&mut update, h, noise);
     update.gain().map(|g| g * update.inverse())
 }
 

@@ -1,17 +1,32 @@
 //! What was learned enters the compensation: only along directions whose interval says that it helps.
 
+use core::ops::Range;
+
 use cvg_model::Float;
 
 use crate::Calibrator;
-use crate::cycle::{MEASURE, absorb, project};
+use crate::correction::Move;
+use crate::cycle::{OPEN, TAKEN, project};
 use crate::parameters::{N, OTHERS, Parameter, Vector, dot, get, set};
-use crate::state::{Commit, State};
-use crate::ud::Ud;
+use crate::state::{Commit, Filter, State, Work};
 
-const SHARE: u16 = MEASURE + 1;
+/// The slices of a commit: the symmetry of the split as a measurement; what to move; the move.
+const PROJECT: u16 = 3;
+const WEIGH: u16 = PROJECT + OPEN - 1;
+const LEARN: u16 = WEIGH + TAKEN - OPEN;
+pub(crate) const DECIDE: u16 = LEARN + 1;
+const DECIDE_PAIR: u16 = DECIDE + 1;
+const SHARE: u16 = DECIDE_PAIR + 1;
 /// The slice after that of the last parameter.
-pub(crate) const SHARED: u16 = 37;
-const LAST: u16 = 40;
+pub(crate) const SHARED: u16 = SHARE + 4 * OTHERS as u16;
+const BEGIN: u16 = SHARED + 1;
+const MOVE: u16 = BEGIN + 1;
+const MOVED: u16 = MOVE + Move::<f32>::PARTS;
+const LEAVE: u16 = MOVED + 1;
+const LEAVE_REST: u16 = LEAVE + 1;
+const LEFT: u16 = LEAVE_REST + 1;
+const HALF: usize = 10;
+
 /// Standard deviations of a direction that is committed.
 const SIGMAS: f64 = 3.0;
 /// The same while it turns: ratio and skew are told anew all the time then, and what is beyond its 95 % interval is followed.
@@ -22,30 +37,51 @@ const NO_DEVICE: i32 = 5;
 const SYMMETRY: f64 = 1e-4;
 
 impl<T: Float> Calibrator<T> {
+    #[inline(never)]
     pub(crate) fn commit_slice(&self, s: &mut State<T>, k: u16) {
-        if s.schedule.commit == Commit::Back {
-            if k == LAST {
-                self.take_back(s);
-            }
+        if s.schedule.commit == Commit::Back && k < SHARED {
             return;
         }
         match k {
-            0 => self.symmetry(s),
-            1..=5 if s.schedule.accept => {
-                let h = s.trial;
-                project(&s.filter.ud, &mut s.filter.update, &h, usize::from(k - 1) * 4, &mut s.filter.spread);
+            0 => s.trial = Self::symmetry(s),
+            1 => {
+                s.score = -get(&s.correction.known, Parameter::QuadratureRate) - dot(&s.trial, &s.filter.mean);
+                s.filter.spread = T::zero();
             }
-            6 if s.schedule.accept => self.weigh(s),
-            7..=18 if s.schedule.accept => absorb(&mut s.filter.ud, &mut s.filter.update, k - 7),
-            19 if s.schedule.accept => {
-                let by = s.score * s.filter.update.inverse();
-                for (mean, gain) in s.filter.mean.iter_mut().zip(s.filter.update.gain()) {
-                    *mean = *mean + *gain * by;
+            2 => s.schedule.accept = self.symmetry_is_seen(s),
+            PROJECT..WEIGH if s.schedule.accept => {
+                let Filter { ud, work, spread, .. } = &mut s.filter;
+                *spread = *spread + project(ud, work, &s.trial, k - PROJECT);
+            }
+            WEIGH if s.schedule.accept => self.weigh(s),
+            WEIGH..LEARN if s.schedule.accept => s.filter.absorb(k - WEIGH - 1),
+            LEARN if s.schedule.accept => s.filter.learn(s.score),
+            DECIDE => {
+                s.trial = [T::zero(); N];
+                if s.schedule.stage >= 2 {
+                    self.decide_phase(s);
                 }
             }
-            MEASURE => self.decide(s),
-            SHARE..SHARED => self.share(s, usize::from(k - SHARE)),
-            LAST => self.put_in_force(s),
+            DECIDE_PAIR if s.schedule.stage >= 2 => self.decide_ratio_and_skew(s),
+            SHARE..SHARED => {
+                let (j, n) = (usize::from((k - SHARE) / 4), (k - SHARE) % 4);
+                if n < 3 {
+                    s.filter.add_variance(j, n);
+                } else {
+                    self.share(s, j);
+                }
+            }
+            SHARED => self.judge(s),
+            BEGIN => s.filter.work = Work::Move(Move::begin(&s.correction)),
+            MOVE..MOVED => {
+                if let Work::Move(way) = &mut s.filter.work {
+                    way.advance(&s.trial, k - MOVE);
+                }
+            }
+            MOVED => self.put_in_force(s),
+            LEAVE => Self::leave(s, 0..HALF),
+            LEAVE_REST => Self::leave(s, HALF..N),
+            LEFT => self.end_commit(s),
             _ => {}
         }
     }
@@ -54,27 +90,30 @@ impl<T: Float> Calibrator<T> {
     ///
     /// $$0 = q_0 - \tfrac12(k_s\gamma + k_c s) + \psi d_s$$
     ///
-    /// taken as one measurement between two commits. Uses [`State::trial`] for its row and [`State::score`] for its
-    /// innovation: both begin anew with the commit.
-    fn symmetry(&self, s: &mut State<T>) {
-        let known = s.correction.known;
-        let believed = |p: Parameter| get(&known, p) + get(&s.filter.mean, p) * p.expected::<T>();
+    /// taken as one measurement between two commits: its row. [`State::trial`] holds it and [`State::score`] its innovation,
+    /// since both begin anew with the commit.
+    fn symmetry(s: &State<T>) -> Vector<T> {
+        let known = &s.correction.known;
+        let believed = |p: Parameter| get(known, p) + get(&s.filter.mean, p) * p.expected::<T>();
         let mut h = [T::zero(); N];
         let mut along = |p: Parameter, v: T| set(&mut h, p, v * p.expected::<T>());
         along(Parameter::QuadratureRate, T::one());
         along(Parameter::DetectionRatio, -(T::half() * believed(Parameter::SplitSin)));
         along(Parameter::DetectionSkew, -(T::half() * believed(Parameter::SplitCos)));
         along(Parameter::DetectionPhase, believed(Parameter::AnisodampingSin));
-        s.score = -get(&known, Parameter::QuadratureRate) - dot(&h, &s.filter.mean);
-        s.trial = h;
-        s.filter.spread = T::zero();
+        h
+    }
+
+    #[inline(never)]
+    fn symmetry_is_seen(&self, s: &State<T>) -> bool {
         let phase = s.filter.ud.variance(Parameter::ForcePhase as usize).sqrt() * Parameter::ForcePhase.expected::<T>();
         let seen = s.schedule.angle_used > self.cycles(10);
-        s.schedule.accept = s.schedule.stage >= 4 && seen && phase < T::from_f64(1e-3);
+        s.schedule.stage >= 4 && seen && phase < T::from_f64(1e-3)
     }
 
     /// The equation is one: it is used again only where it says more than what is known, and no better than it holds in
     /// the coordinates of a ratio and a skew that are still uncertain.
+    #[inline(never)]
     fn weigh(&self, s: &mut State<T>) {
         let uses = s.schedule.uses_of_symmetry.saturating_add(1);
         let unknown = |p: Parameter| s.filter.ud.variance(p as usize) * p.expected::<T>().squared();
@@ -84,37 +123,42 @@ impl<T: Float> Calibrator<T> {
         let all = s.filter.spread + noise;
         if s.filter.spread > T::ratio(4, 1) * noise && s.score * s.score < T::ratio(16, 1) * all {
             s.schedule.uses_of_symmetry = uses;
-            s.filter.ud.open(&mut s.filter.update, noise);
+            s.filter.open(noise);
         } else {
             s.schedule.accept = false;
         }
     }
 
-    /// How much of the detection is committed. What the others are then is theirs given that.
-    fn decide(&self, s: &mut State<T>) {
-        let mut delta: Vector<T> = [T::zero(); N];
-        if s.schedule.stage >= 2 {
-            self.detection(s, &mut delta);
-        }
-        s.trial = delta;
+    fn sigmas(s: &State<T>) -> T {
+        let turning = s.schedule.stage >= 4 && s.schedule.moving > 0;
+        if turning { T::from_f64(SIGMAS_TURNING) } else { T::from_f64(SIGMAS) }
     }
 
-    fn detection(&self, s: &State<T>, delta: &mut Vector<T>) {
-        let ud = &s.filter.ud;
-        let (ratio, skew, phase) = (Parameter::DetectionRatio, Parameter::DetectionSkew, Parameter::DetectionPhase);
-        let sigmas = if s.schedule.stage >= 4 && s.schedule.moving > 0 { SIGMAS_TURNING } else { SIGMAS };
-        let beyond = T::from_f64(sigmas * sigmas);
+    /// How much of the detection is committed: its phase.
+    #[inline(never)]
+    fn decide_phase(&self, s: &mut State<T>) {
+        let phase = Parameter::DetectionPhase;
+        let beyond = Self::sigmas(s).squared();
         let m = get(&s.filter.mean, phase);
-        let v = ud.variance(phase as usize);
+        let v = s.filter.ud.variance(phase as usize);
         if m * m > beyond * v && v < T::ratio(1, 4) {
-            set(delta, phase, m * phase.expected());
+            set(&mut s.trial, phase, m * phase.expected());
         }
+    }
+
+    /// And its ratio and skew, along the principal directions of what is known of them. What the others are then is theirs
+    /// given that.
+    #[inline(never)]
+    fn decide_ratio_and_skew(&self, s: &mut State<T>) {
+        let ud = &s.filter.ud;
+        let (ratio, skew) = (Parameter::DetectionRatio, Parameter::DetectionSkew);
+        let beyond = Self::sigmas(s).squared();
         let (ug, us) = (ratio.expected::<T>(), skew.expected::<T>());
         let pgg = ud.variance(ratio as usize) * ug * ug;
         let pss = ud.variance(skew as usize) * us * us;
         let pgs = ud.covariance(ratio as usize, skew as usize) * ug * us;
         let (mg, ms) = (get(&s.filter.mean, ratio) * ug, get(&s.filter.mean, skew) * us);
-        let (sin, cos) = (T::half() * (T::two() * pgs).atan2(pgg - pss)).sin_cos();
+        let (cos, sin) = principal(pgg, pgs, pss);
         let (mut g, mut k) = (T::zero(), T::zero());
         for (x, y) in [(cos, sin), (-sin, cos)] {
             let variance = x * x * pgg + T::two() * x * y * pgs + y * y * pss;
@@ -124,13 +168,15 @@ impl<T: Float> Calibrator<T> {
                 k = k + y * along;
             }
         }
-        set(delta, ratio, g);
-        set(delta, skew, k);
+        set(&mut s.trial, ratio, g);
+        set(&mut s.trial, skew, k);
     }
 
     //= specs/self-calibration.md#excitation
     //# What was not excited MUST NOT be moved.
-    /// The conditional mean of parameter `j` given what is committed of the detection.
+    /// The conditional mean of parameter `j`, whose variance is [`Filter::spread`](crate::state::Filter), given what is
+    /// committed of the detection.
+    #[inline(never)]
     fn share(&self, s: &mut State<T>, j: usize) {
         let Some(p) = Parameter::ALL.get(j).copied() else { return };
         let ud = &s.filter.ud;
@@ -141,8 +187,8 @@ impl<T: Float> Calibrator<T> {
         let of_phase = excess(Parameter::DetectionPhase) - ud.u(phase, ratio) * of_ratio - ud.u(phase, skew) * of_skew;
         let given =
             get(&s.filter.mean, p) + ud.u(j, phase) * of_phase + ud.u(j, ratio) * of_ratio + ud.u(j, skew) * of_skew;
-        let excited =
-            ud.variance(j) < T::ratio(1, 4) && !(p.needs_known_precession() && s.schedule.angle_used < self.cycles(10));
+        let excited = s.filter.spread < T::ratio(1, 4)
+            && !(p.needs_known_precession() && s.schedule.angle_used < self.cycles(10));
         let coarse =
             matches!(p, Parameter::SplitCos | Parameter::SplitSin | Parameter::Damping | Parameter::ForceScale);
         if excited && (s.schedule.stage > 0 || coarse) {
@@ -156,62 +202,74 @@ impl<T: Float> Calibrator<T> {
         let believed = [
             (Parameter::DetectionRatio, s.correction.detection_ratio()),
             (Parameter::DetectionSkew, s.correction.detection_skew()),
-            (Parameter::DetectionPhase, s.correction.detection_phase()),
+            (Parameter::DetectionPhase, s.correction.detection_lag()),
         ];
         // false for NaN
         believed.into_iter().all(|(p, in_force)| (in_force / p.expected() + get(&s.filter.mean, p)).within(most))
     }
 
-    fn put_in_force(&self, s: &mut State<T>) {
-        s.schedule.commit = Commit::None;
+    /// Whether to move at all; and a move back is the one there was, turned round, in the parameters' own units.
+    #[inline(never)]
+    fn judge(&self, s: &mut State<T>) {
         s.score = T::zero();
-        let trial = s.trial;
-        s.trial = [T::zero(); N];
-        let Some(moved) = s.correction.moved(&trial).filter(|_| self.is_of_a_device(s)) else {
-            // no instrument is like that: what led there is forgotten, but for the mechanics about which it is learned anew
-            s.filter.ud = Ud::diagonal(T::one());
-            s.filter.mean = [T::zero(); N];
-            self.split_changed(s);
-            return;
-        };
-        s.correction = moved;
-        for ((mean, delta), p) in s.filter.mean.iter_mut().zip(&trial).zip(Parameter::ALL) {
-            *mean = *mean - *delta / p.expected::<T>();
-        }
-        let sc = &mut s.schedule;
-        let tracking = sc.stage >= 4;
-        if sc.stage < 3 {
-            let anew = sc.stage == 0 || sc.angle_used < self.cycles(10);
-            let variance = if anew { T::one() } else { T::from_f64(0.01) };
-            s.filter.forget_others(variance);
-        }
-        if !tracking {
-            sc.stage += 1;
-            sc.before_rest = 0;
-        } else {
-            for (slot, (delta, p)) in s.trial.iter_mut().zip(trial.iter().zip(Parameter::ALL)) {
-                *slot = *delta / p.expected::<T>();
+        if s.schedule.commit == Commit::Back {
+            for (slot, p) in s.trial.iter_mut().zip(Parameter::ALL) {
+                *slot = -(*slot * p.expected::<T>());
             }
+        } else if !self.is_of_a_device(s) {
+            self.begin_anew(s);
         }
-        self.resume(s);
     }
 
     //= specs/self-calibration.md#taken-back
     //# A commit that predicts what follows worse than the values before it MUST be taken back.
-    fn take_back(&self, s: &mut State<T>) {
-        s.schedule.commit = Commit::None;
-        s.score = T::zero();
-        let mut back = s.trial;
-        s.trial = [T::zero(); N];
-        for (slot, p) in back.iter_mut().zip(Parameter::ALL) {
-            *slot = -(*slot * p.expected::<T>());
-        }
-        if let Some(moved) = s.correction.moved(&back) {
+    #[inline(never)]
+    fn put_in_force(&self, s: &mut State<T>) {
+        let Work::Move(way) = &s.filter.work else { return };
+        if let Some(moved) = way.end() {
             s.correction = moved;
-            s.taken_back = s.taken_back.saturating_add(1);
-            for ((mean, delta), p) in s.filter.mean.iter_mut().zip(&back).zip(Parameter::ALL) {
-                *mean = *mean - *delta / p.expected::<T>();
+            if s.schedule.commit == Commit::Back {
+                s.taken_back = s.taken_back.saturating_add(1);
             }
+        } else if s.schedule.commit == Commit::Back {
+            s.trial = [T::zero(); N];
+        } else {
+            self.begin_anew(s);
+        }
+    }
+
+    /// No instrument is like that: what led there is forgotten, but for the mechanics about which it is learned anew.
+    fn begin_anew(&self, s: &mut State<T>) {
+        self.split_changed(s);
+        s.schedule.forget(N, T::one());
+    }
+
+    /// What was moved leaves the mean, and is on trial where nothing is linearised any more.
+    #[inline(never)]
+    fn leave(s: &mut State<T>, of: Range<usize>) {
+        let tried = s.schedule.stage >= 4 && s.schedule.commit == Commit::Forth;
+        let Some(parameters) = Parameter::ALL.get(of.clone()) else { return };
+        let (Some(mean), Some(trial)) = (s.filter.mean.get_mut(of.clone()), s.trial.get_mut(of)) else { return };
+        for ((mean, delta), p) in mean.iter_mut().zip(trial).zip(parameters) {
+            let moved = *delta / p.expected::<T>();
+            *mean = *mean - moved;
+            *delta = if tried { moved } else { T::zero() };
+        }
+    }
+
+    #[inline(never)]
+    fn end_commit(&self, s: &mut State<T>) {
+        let sc = &mut s.schedule;
+        let (forth, stage) = (sc.commit == Commit::Forth, sc.stage);
+        let anew = stage == 0 || sc.angle_used < self.cycles(10);
+        match stage {
+            0..3 if forth => sc.forget(OTHERS, if anew { T::one() } else { T::from_f64(0.01) }),
+            // to the end of the cycle: the slices that are left would be of no measurement
+            _ => sc.forget(0, T::one()),
+        }
+        if forth && stage < 4 {
+            sc.stage += 1;
+            sc.before_rest = 0;
         }
         self.resume(s);
     }
@@ -223,5 +281,19 @@ impl<T: Float> Calibrator<T> {
         s.schedule.settle = self.cycles(3) / 2;
         s.schedule.fresh = 0;
         s.before.whole = false;
+    }
+}
+
+/// The direction in which a covariance [[xx, xy], [xy, yy]] is largest, as a cosine and a sine: half the angle of what is
+/// uneven of it.
+fn principal<T: Float>(xx: T, xy: T, yy: T) -> (T, T) {
+    let (even, uneven) = (xx - yy, T::two() * xy);
+    let n = even.norm(uneven);
+    if n > T::zero() {
+        let half = (T::half() * (T::one() + even.magnitude() / n)).sqrt();
+        let other = T::half() * uneven / (n * half);
+        if even < T::zero() { (other, half) } else { (half, other) }
+    } else {
+        (T::one(), T::zero())
     }
 }

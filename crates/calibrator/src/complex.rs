@@ -32,6 +32,12 @@ impl<T: Float> Complex<T> {
         self.re * self.re + self.im * self.im
     }
 
+    /// k z.
+    #[inline]
+    pub fn times(self, k: T) -> Self {
+        Self::new(self.re * k, self.im * k)
+    }
+
     /// 1/z. Domain: z ≠ 0.
     #[inline]
     pub fn inverse(self) -> Self {

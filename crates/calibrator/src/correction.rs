@@ -6,6 +6,7 @@ use cvg_model::{AxisForces, Envelope, Float};
 
 use crate::complex::{Complex, Matrix};
 use crate::parameters::{DETECTION, OTHERS, Parameter, Vector, get, set};
+use crate::window::turn_of;
 
 /// How far a value in force may be from a perfect instrument, in units of what is expected of devices.
 pub(crate) const FARTHEST: f64 = 12.0;
@@ -39,7 +40,19 @@ impl<T: Float> Correction<T> {
     //# Every value in force MUST be finite and one that a device can have for every input.
     /// A correction of these parts; none where they can't be inverted or no device is like that.
     pub(crate) fn of(known: Vector<T>, y_of_y: Complex<T>, y_of_x: Complex<T>, drives: Matrix<T>) -> Option<Self> {
-        let drives_inverse = drives.inverse()?;
+        let zero = Complex::real(T::zero());
+        let made = Self { known, y_of_y, y_of_x, drives, y_inverse: zero, drives_inverse: Matrix::identity() };
+        made.values_are_of_a_device().then_some(made)?.inverted()
+    }
+
+    fn values_are_of_a_device(&self) -> bool {
+        let far = |p: &Parameter| p.expected::<T>() * T::from_f64(FARTHEST);
+        self.known.iter().zip(&Parameter::ALL).all(|(value, p)| value.within(far(p)))
+    }
+
+    /// The same with its own inverses; none where the electronics are no device's.
+    fn inverted(self) -> Option<Self> {
+        let Self { y_of_y, y_of_x, drives, .. } = self;
         let near = |z: Complex<T>, target: T, reach: f64| {
             (z.re - target).within(T::from_f64(reach)) && z.im.within(T::from_f64(reach))
         };
@@ -49,9 +62,9 @@ impl<T: Float> Correction<T> {
             && near(drives.xx, one, 0.5)
             && near(drives.yy, one, 0.5)
             && near(drives.xy, zero, 0.2)
-            && near(drives.yx, zero, 0.2)
-            && Parameter::ALL.iter().all(|p| get(&known, *p).within(p.expected::<T>() * T::from_f64(FARTHEST)));
-        plausible.then(|| Self { known, y_of_y, y_of_x, drives, y_inverse: y_of_y.inverse(), drives_inverse })
+            && near(drives.yx, zero, 0.2);
+        let drives_inverse = plausible.then(|| drives.inverse())??;
+        Some(Self { y_inverse: y_of_y.inverse(), drives_inverse, ..self })
     }
 
     //= specs/self-calibration.md#undone
@@ -85,44 +98,11 @@ impl<T: Float> Correction<T> {
     /// Moved by `delta`, exactly: the mechanics and the drives seen through the new readout, then their own changes.
     /// None where the outcome is no instrument.
     pub(crate) fn moved(&self, delta: &Vector<T>) -> Option<Self> {
-        let d = |p| get(delta, p);
-        let (one, zero) = (T::one(), T::zero());
-        let mut known = self.known;
-        let (mut y_of_y, mut y_of_x, mut drives) = (self.y_of_y, self.y_of_x, self.drives);
-        if delta.iter().skip(OTHERS).take(DETECTION).any(|d| *d != zero) {
-            let (sin, cos) = d(Parameter::DetectionPhase).sin_cos();
-            let ratio = one + d(Parameter::DetectionRatio);
-            let step = Matrix {
-                xx: Complex::real(one),
-                xy: Complex::real(zero),
-                yx: Complex::real(d(Parameter::DetectionSkew)),
-                yy: Complex::new(ratio * cos, -(ratio * sin)),
-            };
-            let back = step.inverse()?;
-            set_mechanics(&mut known, &back.times(&mechanics(&self.known).times(&step)));
-            drives = back.times(&drives);
-            y_of_x = y_of_x + y_of_y * step.yx;
-            y_of_y = y_of_y * step.yy;
+        let mut way = Move::begin(self);
+        for part in 0..Move::<T>::PARTS {
+            way.advance(delta, part);
         }
-        for (p, change) in Parameter::ALL.iter().zip(delta) {
-            if is_mechanical(*p) {
-                let value = get(&known, *p) + *change;
-                set(&mut known, *p, value);
-            }
-        }
-        let (scale, turn) = (d(Parameter::ForceScale), d(Parameter::ForceRotation));
-        let phase = d(Parameter::ForcePhase);
-        let change = Matrix {
-            xx: Complex::new(one + scale, phase),
-            xy: Complex::real(-turn),
-            yx: Complex::real(turn + d(Parameter::ForceSkew)),
-            yy: Complex::new(one + scale + d(Parameter::ForceRatio), phase + d(Parameter::ForcePhaseDifference)),
-        };
-        drives = change.times(&drives);
-        // no parameter is the phase of a skew: what can't be learned isn't kept either
-        drives.xy.im = zero;
-        drives.yx.im = zero;
-        Self::of(known, y_of_y, y_of_x, drives)
+        way.end()
     }
 
     /// The same with skews in phase with what they are skews of, which no parameter says: the Y readout delays what it sees
@@ -158,9 +138,118 @@ impl<T: Float> Correction<T> {
         (-self.y_of_y.im).atan2(self.y_of_y.re)
     }
 
+    /// Tangent of ψ in force.
+    pub(crate) fn detection_lag(&self) -> T {
+        -(self.y_of_y.im / self.y_of_y.re)
+    }
+
     /// s in force.
     pub fn detection_skew(&self) -> T {
         self.y_of_x.re
+    }
+}
+
+/// [`Correction::moved`], part by part: no control step has to do all of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Move<T> {
+    to: Correction<T>,
+    /// what the new Y readout makes of X and of Y behind the one in force, and one over the latter
+    yx: T,
+    yy: Complex<T>,
+    per_yy: Complex<T>,
+    /// the detection moves
+    sees: bool,
+    sound: bool,
+}
+
+impl<T: Float> Move<T> {
+    pub(crate) const PARTS: u16 = 7;
+
+    pub(crate) fn begin(from: &Correction<T>) -> Self {
+        let one = Complex::real(T::one());
+        Self { to: *from, yx: T::zero(), yy: one, per_yy: one, sees: false, sound: true }
+    }
+
+    /// Part `n` of the way, one after the other, always with the same `delta`.
+    pub(crate) fn advance(&mut self, delta: &Vector<T>, n: u16) {
+        match n {
+            0 => self.turn_readout(delta),
+            1 if self.sees => {
+                let seen = self.between(&mechanics(&self.to.known));
+                set_mechanics(&mut self.to.known, &seen);
+            }
+            2 if self.sees => {
+                self.to.drives = self.seen(&self.to.drives);
+                self.to.y_of_x = self.to.y_of_x + self.to.y_of_y.times(self.yx);
+                self.to.y_of_y = self.to.y_of_y * self.yy;
+            }
+            3 => add_mechanics(&mut self.to.known, delta),
+            4 => self.turn_drives(delta),
+            5 => self.sound = self.sound && self.to.values_are_of_a_device(),
+            6 => match self.to.inverted() {
+                Some(to) => self.to = to,
+                None => self.sound = false,
+            },
+            _ => {}
+        }
+    }
+
+    /// Where it leads to; none where that is no instrument.
+    pub(crate) fn end(&self) -> Option<Correction<T>> {
+        self.sound.then_some(self.to)
+    }
+
+    fn turn_readout(&mut self, delta: &Vector<T>) {
+        self.sees = delta.iter().skip(OTHERS).take(DETECTION).any(|d| *d != T::zero());
+        let (sin, cos) = turn_of(get(delta, Parameter::DetectionPhase));
+        let ratio = T::one() + get(delta, Parameter::DetectionRatio);
+        self.yx = get(delta, Parameter::DetectionSkew);
+        self.yy = Complex::new(ratio * cos, -(ratio * sin));
+        let n = self.yy.squared_norm();
+        // false for NaN
+        self.sound = n > T::from_f64(1e-6) && n.is_finite();
+        self.per_yy = self.yy.inverse();
+    }
+
+    /// What a matrix that ends in the readout becomes behind the new one.
+    fn seen(&self, m: &Matrix<T>) -> Matrix<T> {
+        let y = |x: Complex<T>, y: Complex<T>| (y - x.times(self.yx)) * self.per_yy;
+        Matrix { xx: m.xx, xy: m.xy, yx: y(m.xx, m.yx), yy: y(m.xy, m.yy) }
+    }
+
+    /// What one that begins in it, too, becomes.
+    fn between(&self, m: &Matrix<T>) -> Matrix<T> {
+        self.seen(&Matrix {
+            xx: m.xx + m.xy.times(self.yx),
+            xy: m.xy * self.yy,
+            yx: m.yx + m.yy.times(self.yx),
+            yy: m.yy * self.yy,
+        })
+    }
+
+    fn turn_drives(&mut self, delta: &Vector<T>) {
+        let d = |p| get(delta, p);
+        let (one, zero) = (T::one(), T::zero());
+        let (scale, turn, phase) = (d(Parameter::ForceScale), d(Parameter::ForceRotation), d(Parameter::ForcePhase));
+        let change = Matrix {
+            xx: Complex::new(one + scale, phase),
+            xy: Complex::real(-turn),
+            yx: Complex::real(turn + d(Parameter::ForceSkew)),
+            yy: Complex::new(one + scale + d(Parameter::ForceRatio), phase + d(Parameter::ForcePhaseDifference)),
+        };
+        let drives = &mut self.to.drives;
+        *drives = change.times(drives);
+        // no parameter is the phase of a skew: what can't be learned isn't kept either
+        drives.xy.im = zero;
+        drives.yx.im = zero;
+    }
+}
+
+fn add_mechanics<T: Float>(known: &mut Vector<T>, delta: &Vector<T>) {
+    for ((value, change), p) in known.iter_mut().zip(delta).zip(Parameter::ALL) {
+        if is_mechanical(p) {
+            *value = *value + *change;
+        }
     }
 }
 

@@ -3,68 +3,118 @@
 use cvg_model::Float;
 
 use crate::parameters::{DETECTION, N, OTHERS, Parameter, dot};
-use crate::regressors::{CHANNELS, rates, turned};
-use crate::state::{Commit, State};
-use crate::ud::Ud;
+use crate::regressors::{CHANNELS, PARTS, part, turned};
+use crate::state::{Commit, Filter, Forgetting, State, Work};
+use crate::ud::{Ud, Update};
 use crate::{Calibrator, parameters};
 
-/// Control steps that a cycle needs.
-pub(crate) const SLICES: u16 = 80;
-/// Slices of a measurement: innovation, five of the first pass, gate, twelve of the second, the mean.
-pub(crate) const MEASURE: u16 = 20;
-const FIRST_MEASURE: u16 = 5;
-const GROW: u16 = FIRST_MEASURE + MEASURE * 3;
-/// Columns of the second pass, some twenty elements a slice.
-const COLUMNS: [(usize, usize); 12] =
-    [(0, 6), (6, 8), (8, 10), (10, 11), (11, 12), (12, 13), (13, 14), (14, 15), (15, 16), (16, 17), (17, 18), (18, 19)];
-/// What the model neglects before each linearisation, rad.
-const FLOOR: [f64; 5] = [1e-3, 5e-4, 1e-4, 2e-5, 3e-6];
+/// Slices that a cycle needs: none does more than some 200 instructions.
+pub(crate) const SLICES: u16 = 160;
+/// Those of the first pass of a measurement, and of the second.
+const PROJECT: u16 = 7;
+const ABSORB: u16 = 21;
+/// A variance is taken in three slices, of the columns between these.
+pub(crate) const THIRDS: [usize; 4] = [0, 8, 13, N];
+/// Slices of a measurement: innovation, the first pass, gate, the second pass, the mean; then what the next cycle begins with.
+pub(crate) const OPEN: u16 = 1 + PROJECT;
+pub(crate) const TAKEN: u16 = OPEN + 1 + ABSORB;
+const RETIRE: u16 = TAKEN + 1;
+pub(crate) const MEASURE: u16 = RETIRE + PARTS as u16;
+/// The slices of a cycle.
+const INTEGRATE: u16 = PARTS as u16 + 1;
+const DETECT: u16 = 2 + INTEGRATE;
+const DETECTED: u16 = DETECT + 3;
+const NOTICE: u16 = DETECTED + 1;
+const OTHER_CHANNELS: u16 = NOTICE + 1;
+pub(crate) const FIRST_MEASURE: u16 = OTHER_CHANNELS + 2 * INTEGRATE;
+const GROW: u16 = FIRST_MEASURE + MEASURE * CHANNELS as u16;
+const PLAN: u16 = GROW + 4 + N as u16;
 /// White noise never falls below this, rad.
 const GATE: f64 = 36.0;
 
 /// How well the precession by force is known: standard deviations of the force scale, relative, and of the constant rate,
 /// rad/s.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Doubt<T> {
-    force_scale: T,
-    rate: T,
+    pub(crate) force_scale: T,
+    pub(crate) rate: T,
 }
 
 impl<T: Float> Doubt<T> {
     pub(crate) fn of(s: &State<T>) -> Self {
-        let of = |p: Parameter| s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>();
-        Self { force_scale: of(Parameter::ForceScale), rate: of(Parameter::Rate) }
+        Self { force_scale: deviation(s, Parameter::ForceScale), rate: deviation(s, Parameter::Rate) }
     }
 }
 
+fn deviation<T: Float>(s: &State<T>, p: Parameter) -> T {
+    s.filter.ud.variance(p as usize).sqrt() * p.expected::<T>()
+}
+
 impl<T: Float> Calibrator<T> {
+    /// This control step's slices: one, or two where a cycle is of fewer steps.
     pub(crate) fn work(&self, s: &mut State<T>) {
-        let k = s.step;
-        if s.schedule.commit != Commit::None {
-            self.commit_slice(s, k);
-            return;
+        if self.steps >= SLICES {
+            self.slice(s, s.step);
+        } else {
+            self.slice(s, 2 * s.step);
+            self.slice(s, 2 * s.step + 1);
+        }
+    }
+
+    /// A column of what is forgotten, and the mean at last.
+    fn forget_slice(s: &mut State<T>, k: u16) {
+        let Forgetting { count, done, d } = s.schedule.forgetting;
+        let (count, column) = (usize::from(count), usize::from(done));
+        if column < N {
+            s.filter.ud.forget(column, count, d);
+        } else if column == N {
+            for mean in s.filter.mean.iter_mut().take(count) {
+                *mean = T::zero();
+            }
+            s.filter.work = Work::Measure(Update::idle());
+        }
+        s.schedule.forgetting.done = done.saturating_add(1);
+        if k == SLICES - 1 && column >= N {
+            s.schedule.commit = Commit::None;
+        }
+    }
+
+    fn slice(&self, s: &mut State<T>, k: u16) {
+        match s.schedule.commit {
+            Commit::None => {}
+            Commit::Forget => return Self::forget_slice(s, k),
+            Commit::Forth | Commit::Back => return self.commit_slice(s, k),
         }
         match k {
             0 => self.close(s),
-            1 if s.schedule.live => self.direct(s),
-            2 if s.schedule.live => {
-                self.integrate(s, 1);
-                self.detect(s);
+            GROW..PLAN => self.grow(s, k - GROW),
+            PLAN => self.plan(s),
+            _ if !s.schedule.live => {}
+            1 => s.closed.direct(&mut s.sample),
+            2..DETECT => self.integrate(s, 1, usize::from(k - 2)),
+            DETECT..DETECTED => s.filter.add_variance(Parameter::ForceScale as usize, k - DETECT),
+            DETECTED => {
+                s.schedule.doubt.force_scale = s.filter.spread.sqrt() * Parameter::ForceScale.expected::<T>();
+                s.schedule.doubt.rate = deviation(s, Parameter::Rate);
             }
-            3 if s.schedule.live => self.integrate(s, 0),
-            4 if s.schedule.live => self.integrate(s, 2),
-            FIRST_MEASURE..GROW if s.schedule.live => {
+            NOTICE => {
+                self.notice(s, s.schedule.doubt);
+            }
+            OTHER_CHANNELS..FIRST_MEASURE => {
+                let n = k - OTHER_CHANNELS;
+                self.integrate(s, usize::from(2 * (n / INTEGRATE)), usize::from(n % INTEGRATE));
+            }
+            FIRST_MEASURE..GROW => {
                 let n = k - FIRST_MEASURE;
                 self.measure(s, usize::from(n / MEASURE), n % MEASURE);
             }
-            77 => self.plan(s),
-            GROW..77 => self.grow(s, k == GROW),
             _ => {}
         }
     }
 
     //= specs/self-calibration.md#held
     //# Nothing MUST be learned from a disturbed instrument.
+    #[inline(never)]
     pub(crate) fn close(&self, s: &mut State<T>) {
         match s.closed.close(self.control_s) {
             Some(sample) => {
@@ -80,32 +130,49 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
-    pub(crate) fn direct(&self, s: &mut State<T>) {
-        s.closed.direct(&mut s.sample);
-        s.schedule.turn =
-            if s.before.whole { half_turns(pick(&s.sample.y, 1) - pick(&s.before.y, 1)) } else { T::zero() };
+    /// What was seen beyond what is known, and what each parameter should have shown of it, part by part.
+    #[inline(never)]
+    pub(crate) fn integrate(&self, s: &mut State<T>, c: usize, n: usize) {
+        if n >= PARTS {
+            return self.see(s, c);
+        }
+        let half_s = T::half() * self.cycle_s;
+        let row = part(&s.sample, &s.correction.known, c, n != 1 || self.scaled(s), n);
+        let filter = &mut s.filter;
+        let of = row.first..row.end;
+        let Some(shown) = filter.shown.get_mut(c).and_then(|v| v.get_mut(of.clone())) else { return };
+        let (Some(mean), Some(units)) = (filter.mean.get(of.clone()), Parameter::ALL.get(of)) else { return };
+        let mut believed = if n == 0 { T::zero() } else { filter.believed };
+        for ((((shown, mean), p), rate), direct) in shown.iter_mut().zip(mean).zip(units).zip(row.rate).zip(row.direct)
+        {
+            let step = (half_s * rate + direct) * p.expected();
+            *shown = *shown + step;
+            believed = believed + step * *mean;
+        }
+        filter.believed = believed;
     }
 
-    /// What was seen beyond what is known, and what each parameter should have shown of it.
-    pub(crate) fn integrate(&self, s: &mut State<T>, c: usize) {
-        let half_s = T::half() * self.cycle_s;
-        let (h, direct) = rates(&s.sample, &s.correction.known, c, self.scaled(s));
-        let change = if c == 1 { s.schedule.turn } else { pick(&s.sample.y, c) - pick(&s.before.y, c) };
-        let seen = change - pick(&s.before.late, c) - pick(&s.sample.early, c);
-        let Some(shown) = s.filter.shown.get_mut(c) else { return };
-        let mut new = T::zero();
-        for (((shown, h), direct), mean) in shown.iter_mut().zip(&h).zip(&direct).zip(&s.filter.mean) {
-            let step = half_s * *h + *direct;
-            *shown = *shown + step;
-            new = new + step * *mean;
+    /// Every part of it.
+    pub(crate) fn integrate_all(&self, s: &mut State<T>, c: usize) {
+        for n in 0..=PARTS {
+            self.integrate(s, c, n);
         }
+    }
+
+    /// The end of [`Calibrator::integrate`]: what was seen, and what a turn that no force explains shows of the detection.
+    #[inline(never)]
+    fn see(&self, s: &mut State<T>, c: usize) {
+        let change = pick(&s.sample.y, c) - pick(&s.before.y, c);
+        let seen = change - pick(&s.before.late, c) - pick(&s.sample.early, c);
         if let Some(slot) = s.filter.seen.get_mut(c) {
             *slot = self.forget * *slot + seen;
         }
         if c == 1 {
             // what neither forces nor mechanics, known and believed, explain of the turn
-            s.schedule.turn = if s.before.whole { seen - new - s.before.angle } else { T::zero() };
-        } else if s.schedule.excited {
+            s.schedule.turn = if s.before.whole { seen - s.filter.believed - s.before.angle } else { T::zero() };
+        } else if s.schedule.excited
+            && let Some(shown) = s.filter.shown.get_mut(c)
+        {
             let half_turn = T::half() * s.schedule.turn;
             let now = turned(c, s.sample.cos_2, s.sample.sin_2, half_turn);
             let then = turned(c, s.before.cos_2, s.before.sin_2, half_turn);
@@ -123,22 +190,38 @@ impl<T: Float> Calibrator<T> {
         s.schedule.moving == 0 || s.schedule.angle_used >= self.cycles(10)
     }
 
-    /// The cycle is past: what of it belongs to the next one's step.
-    fn retire(&self, s: &mut State<T>, c: usize) {
+    /// The cycle is past: what of it belongs to the next one's step, part by part.
+    #[inline(never)]
+    fn retire(&self, s: &mut State<T>, c: usize, n: usize) {
         let half_s = T::half() * self.cycle_s;
-        let (h, direct) = rates(&s.sample, &s.correction.known, c, self.scaled(s));
-        let Some(shown) = s.filter.shown.get_mut(c) else { return };
-        let mut ahead = T::zero();
-        for (((shown, h), direct), mean) in shown.iter_mut().zip(&h).zip(&direct).zip(&s.filter.mean) {
-            let step = half_s * *h - *direct;
+        let row = part(&s.sample, &s.correction.known, c, n != 1 || self.scaled(s), n);
+        let filter = &mut s.filter;
+        let Some(all) = filter.shown.get_mut(c) else { return };
+        if n == PARTS - 1 {
+            for slot in all.get_mut(OTHERS..).unwrap_or(&mut []) {
+                *slot = self.forget * *slot;
+            }
+        }
+        let mut ahead = if n == 0 { T::zero() } else { filter.believed };
+        let of = row.first..row.end;
+        let Some(shown) = all.get_mut(of.clone()) else { return };
+        let (Some(mean), Some(units)) = (filter.mean.get(of.clone()), Parameter::ALL.get(of)) else { return };
+        for ((((shown, mean), p), rate), direct) in shown.iter_mut().zip(mean).zip(units).zip(row.rate).zip(row.direct)
+        {
+            let step = (half_s * rate - direct) * p.expected();
             *shown = self.forget * *shown + step;
             ahead = ahead + step * *mean;
+        }
+        filter.believed = ahead;
+        if n < PARTS - 1 {
+            return;
         }
         if c == 1 {
             s.before.angle = ahead;
         }
         if c == CHANNELS - 1 {
             s.before.y = s.sample.y;
+            put(&mut s.before.y, 1, s.sample.before_next);
             s.before.late = s.sample.late;
             s.before.cos_2 = s.sample.cos_2;
             s.before.sin_2 = s.sample.sin_2;
@@ -149,23 +232,21 @@ impl<T: Float> Calibrator<T> {
     pub(crate) fn measure(&self, s: &mut State<T>, c: usize, k: u16) {
         match k {
             0 => self.innovate(s, c),
-            19 => {
-                if s.schedule.accept {
-                    self.learn(s, c);
-                }
-                self.retire(s, c);
-            }
+            RETIRE.. => self.retire(s, c, usize::from(k - RETIRE)),
             _ if !s.schedule.accept => {}
-            1..=5 => {
-                let Some(h) = s.filter.shown.get(c) else { return };
-                let first = usize::from(k - 1) * 4;
-                project(&s.filter.ud, &mut s.filter.update, h, first, &mut s.filter.spread);
+            OPEN => self.gate(s, c),
+            TAKEN => self.learn(s, c),
+            1..OPEN => {
+                let Filter { ud, work, shown, spread, .. } = &mut s.filter;
+                if let Some(h) = shown.get(c) {
+                    *spread = *spread + project(ud, work, h, k - 1);
+                }
             }
-            6 => self.gate(s, c),
-            _ => absorb(&mut s.filter.ud, &mut s.filter.update, k - 7),
+            _ => s.filter.absorb(k - OPEN - 1),
         }
     }
 
+    #[inline(never)]
     fn innovate(&self, s: &mut State<T>, c: usize) {
         s.schedule.accept = s.schedule.fresh > 0;
         if c == 1 && pick(&s.schedule.hold, 1) > 0 {
@@ -195,11 +276,12 @@ impl<T: Float> Calibrator<T> {
 
     /// The variance of this channel's white noise and of what the model neglects.
     fn variance(&self, s: &State<T>, c: usize) -> T {
-        let floor = T::from_f64(FLOOR.get(usize::from(s.schedule.stage)).copied().unwrap_or(3e-6));
+        let floor = floor::<T>(s.schedule.stage);
         let still = pick(&s.filter.noise, c) + floor * floor;
         if s.schedule.excited { still + T::from_f64(9e-10) * s.schedule.rate.squared() } else { still }
     }
 
+    #[inline(never)]
     fn gate(&self, s: &mut State<T>, c: usize) {
         let noise = self.variance(s, c);
         let all = s.filter.spread + noise;
@@ -231,14 +313,12 @@ impl<T: Float> Calibrator<T> {
             let would = dot(shown, &s.trial);
             s.score = s.score + T::half() * would * (would + T::two() * e) / all;
         }
-        s.filter.ud.open(&mut s.filter.update, noise);
+        s.filter.open(noise);
     }
 
+    #[inline(never)]
     fn learn(&self, s: &mut State<T>, c: usize) {
-        let by = pick(&s.filter.innovation, c) * s.filter.update.inverse();
-        for (mean, gain) in s.filter.mean.iter_mut().zip(s.filter.update.gain()) {
-            *mean = *mean + *gain * by;
-        }
+        s.filter.learn(pick(&s.filter.innovation, c));
         if c == 0 && s.schedule.excited {
             s.schedule.untold = 0;
         }
@@ -247,32 +327,31 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
-    /// One parameter a cycle may have wandered, while it is better known than expected of any device.
-    pub(crate) fn grow(&self, s: &mut State<T>, begin: bool) {
-        if !begin {
-            s.filter.ud.grow(&mut s.filter.growth);
-            s.filter.ud.grow(&mut s.filter.growth);
-            return;
+    /// One parameter a cycle may have wandered, while it is better known than expected of any device. The first slice looks
+    /// how well that is.
+    #[inline(never)]
+    pub(crate) fn grow(&self, s: &mut State<T>, k: u16) {
+        match k {
+            0..3 => s.filter.add_variance(s.filter.growing, k),
+            3 => {
+                let j = s.filter.growing;
+                s.filter.growing = if j + 1 < N { j + 1 } else { 0 };
+                if let Some(p) = Parameter::ALL.get(j)
+                    && s.schedule.live
+                    && s.filter.spread < T::one()
+                {
+                    let sigma = p.wander::<T>() / p.expected::<T>();
+                    let q = sigma * sigma * self.cycle_s * T::ratio(19, 1);
+                    Ud::grow_begin(&mut s.filter.growth, j, q);
+                }
+            }
+            _ => s.filter.ud.grow(&mut s.filter.growth),
         }
-        let j = s.filter.growing;
-        s.filter.growing = if j + 1 < N { j + 1 } else { 0 };
-        if let Some(p) = Parameter::ALL.get(j)
-            && s.schedule.live
-            && s.filter.ud.variance(j) < T::one()
-        {
-            let sigma = p.wander::<T>() / p.expected::<T>();
-            let q = sigma * sigma * self.cycle_s * T::ratio(19, 1);
-            Ud::grow_begin(&mut s.filter.growth, j, q);
-        }
-    }
-
-    /// Whether the instrument turns: what nothing explains of the angle, against how well the precession is known.
-    pub(crate) fn detect(&self, s: &mut State<T>) {
-        self.notice(s, Doubt::of(s));
     }
 
     /// The instrument turns where more is unexplained than forces and mechanics may leave of the rate, as well as they are
     /// known, and for two seconds after.
+    #[inline(never)]
     pub(crate) fn notice(&self, s: &mut State<T>, doubt: Doubt<T>) {
         let limit = T::from_f64(0.02)
             + T::from_f64(2.5) * doubt.force_scale * s.sample.push.aside.magnitude()
@@ -280,14 +359,15 @@ impl<T: Float> Calibrator<T> {
         let sc = &mut s.schedule;
         sc.rate = sc.turn * self.cycles_per_s;
         sc.swept = sc.swept + sc.turn.magnitude();
-        sc.unexplained = sc.unexplained + T::ratio(1, 5) * (sc.rate - sc.unexplained);
+        sc.unexplained = sc.unexplained + self.smoothing * (sc.rate - sc.unexplained);
         if !sc.unexplained.within(limit) {
             if sc.moving == 0 {
                 // what turned before it was noticed isn't in the integrals
                 sc.fresh = 0;
                 if sc.stage == 0 {
-                    s.filter.forget_others(T::one());
+                    sc.forget(OTHERS, T::one());
                     sc.used = 0;
+                    s.before.whole = false;
                 } else if sc.stage == 1 && sc.angle_used < self.cycles(10) {
                     // too short a rest to learn anything from: on as before it
                     sc.stage = sc.stage.max(sc.before_rest);
@@ -315,27 +395,105 @@ impl<T: Float> Calibrator<T> {
     }
 }
 
-/// Four columns of the first pass.
-pub(crate) fn project<T: Float>(
-    ud: &Ud<T>,
-    update: &mut crate::ud::Update<T>,
-    h: &parameters::Vector<T>,
-    first: usize,
-    spread: &mut T,
-) {
-    for j in first..first + 4 {
-        if j < N {
-            *spread = *spread + ud.project(update, h, j);
+/// What the model neglects before each linearisation, rad.
+fn floor<T: Float>(stage: u8) -> T {
+    let c = T::from_f64;
+    match stage {
+        0 => c(1e-3),
+        1 => c(5e-4),
+        2 => c(1e-4),
+        3 => c(2e-5),
+        _ => c(3e-6),
+    }
+}
+
+/// A slice of the first pass of a measurement along `h`: what it adds to the innovation's variance.
+pub(crate) fn project<T: Float>(ud: &Ud<T>, work: &mut Work<T>, h: &parameters::Vector<T>, slice: u16) -> T {
+    let Some(update) = work.update() else { return T::zero() };
+    macro_rules! columns {
+        ($($j:literal)+) => { T::zero() $(+ ud.project::<$j>(update, h))+ };
+    }
+    match slice {
+        0 => columns!(0 1 2 3 4 5 6),
+        1 => columns!(7 8 9),
+        2 => columns!(10 11),
+        3 => columns!(12 13),
+        4 => columns!(14 15),
+        5 => columns!(16 17),
+        _ => columns!(18),
+    }
+}
+
+impl<T: Float> Filter<T> {
+    /// A third of P_jj; all of it is in `spread` after the last.
+    pub(crate) fn add_variance(&mut self, j: usize, third: u16) {
+        let at = |n: u16| THIRDS.get(usize::from(n)).copied().unwrap_or(N);
+        let before = if third == 0 { T::zero() } else { self.spread };
+        self.spread = before + self.ud.variance_by(j, at(third), at(third + 1));
+    }
+
+    /// Between the passes.
+    pub(crate) fn open(&mut self, noise: T) {
+        if let Some(update) = self.work.update() {
+            self.ud.open(update, noise);
+        }
+    }
+
+    /// A slice of the second pass: some columns, or some of one's rows.
+    pub(crate) fn absorb(&mut self, slice: u16) {
+        let Some(update) = self.work.update() else { return };
+        let ud = &mut self.ud;
+        macro_rules! columns {
+            ($($j:literal)+) => {{ $(ud.absorb::<$j>(update);)+ }};
+        }
+        macro_rules! first_rows {
+            ($j:literal, $end:literal) => {{
+                ud.absorb_diagonal::<$j>(update);
+                ud.absorb_rows::<$j, 0, $end>(update);
+            }};
+        }
+        match slice {
+            0 => columns!(0 1 2),
+            1 => columns!(3 4),
+            2 => columns!(5),
+            3 => columns!(6),
+            4 => columns!(7),
+            5 => columns!(8),
+            6 => columns!(9),
+            7 => columns!(10),
+            8 => columns!(11),
+            9 => columns!(12),
+            10 => columns!(13),
+            11 => first_rows!(14, 6),
+            12 => ud.absorb_rows::<14, 6, 14>(update),
+            13 => first_rows!(15, 6),
+            14 => ud.absorb_rows::<15, 6, 15>(update),
+            15 => first_rows!(16, 7),
+            16 => ud.absorb_rows::<16, 7, 16>(update),
+            17 => first_rows!(17, 7),
+            18 => ud.absorb_rows::<17, 7, 17>(update),
+            19 => first_rows!(18, 7),
+            _ => ud.absorb_rows::<18, 7, 18>(update),
+        }
+    }
+
+    /// The mean moves by what the measurement showed.
+    pub(crate) fn learn(&mut self, innovation: T) {
+        let Some(update) = self.work.update() else { return };
+        let by = innovation * update.inverse();
+        for (mean, gain) in self.mean.iter_mut().zip(update.gain()) {
+            *mean = *mean + *gain * by;
         }
     }
 }
 
-/// A slice of the second pass.
-pub(crate) fn absorb<T: Float>(ud: &mut Ud<T>, update: &mut crate::ud::Update<T>, slice: u16) {
-    if let Some((first, end)) = COLUMNS.get(usize::from(slice)) {
-        for j in *first..*end {
-            ud.absorb(update, j);
-        }
+impl<T: Float> crate::state::Schedule<T> {
+    /// The first `count` parameters are as unknown as `d`, in expected units squared: from the next slice on.
+    pub(crate) fn forget(&mut self, count: usize, d: T) {
+        self.commit = Commit::Forget;
+        #[allow(clippy::cast_possible_truncation, reason = "at most the number of parameters")]
+        let count = count as u8;
+        self.forgetting = Forgetting { count, done: 0, d };
     }
 }
 
@@ -353,16 +511,5 @@ fn pick<V: Copy>(v: &[V; CHANNELS], c: usize) -> V {
 fn put<V>(v: &mut [V], c: usize, value: V) {
     if let Some(slot) = v.get_mut(c) {
         *slot = value;
-    }
-}
-
-/// An angle with a sign that keeps: within half a turn.
-fn half_turns<T: Float>(x: T) -> T {
-    if x > T::PI {
-        x - T::two() * T::PI
-    } else if x < -T::PI {
-        x + T::two() * T::PI
-    } else {
-        x
     }
 }

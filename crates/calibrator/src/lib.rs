@@ -59,7 +59,7 @@ pub struct Settings {
     pub drive_per_s: f64,
     /// 1/τ as designed, 1/s
     pub damping_per_s: f64,
-    /// control steps to a cycle of the filter
+    /// control steps to a cycle of the filter: with fewer than 160, each has twice the work
     pub steps: u16,
     /// fastest precession that may be commanded at rest, rad/s
     pub precession_rad_s: f64,
@@ -74,7 +74,7 @@ impl Default for Settings {
             amplitude_v: 1.0,
             drive_per_s: 1.0,
             damping_per_s: 0.05,
-            steps: 80,
+            steps: 160,
             precession_rad_s: 0.698_131_7,
             dither_rad_s: 0.05,
         }
@@ -125,15 +125,18 @@ pub struct Calibrator<T> {
     forget: T,
     precession: T,
     dither: T,
+    /// share of the rate that a cycle leaves unexplained in what is believed of it
+    smoothing: T,
     steps: u16,
     cycles_per_s: T,
+    cycles_per_65536_s: u32,
 }
 
 impl<T: Float> Calibrator<T> {
     /// # Errors
     /// A setting outside its domain.
     pub fn new(s: &Settings) -> Result<Self, ConfigError> {
-        if s.steps < cycle::SLICES {
+        if s.steps < cycle::SLICES / 2 {
             return Err(ConfigError { parameter: "steps", expected: "at least 80" });
         }
         Self::of_cycles(s)
@@ -162,10 +165,13 @@ impl<T: Float> Calibrator<T> {
             drive_per_s: positive(s.drive_per_s, "drive_per_s")?,
             damping_per_s: positive(s.damping_per_s, "damping_per_s")?,
             forget: T::from_f64(1.0 - 0.2 * cycle),
+            smoothing: T::from_f64(5.0 * cycle),
             precession: positive(s.precession_rad_s, "precession_rad_s")?,
             dither: positive(s.dither_rad_s, "dither_rad_s")?,
             steps: s.steps,
             cycles_per_s: T::from_f64(1.0 / cycle),
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 100 a second")]
+            cycles_per_65536_s: (65_536.0 / cycle) as u32,
         })
     }
 
@@ -176,8 +182,8 @@ impl<T: Float> Calibrator<T> {
             filter: Filter::new(),
             before: Before::none(),
             schedule: Schedule::new(self.cycles(2)),
-            sums: Sums::empty(),
-            closed: Sums::empty(),
+            sums: Sums::after((T::one(), T::zero())),
+            closed: Sums::after((T::one(), T::zero())),
             sample: window::Sample::blank(),
             trial: [T::zero(); parameters::N],
             score: T::zero(),
@@ -245,22 +251,21 @@ impl<T: Float> Calibrator<T> {
         if state.step >= self.steps {
             state.step = 0;
             state.closed = state.sums;
-            state.sums = Sums::empty();
+            state.sums = Sums::after(direction);
         }
     }
 
     /// The split was changed on purpose, by a tuning electrode: mechanics and drives are learned anew, and the new split
     /// says of the detection what the old one couldn't. Neither its size nor its axis need be known.
     pub fn split_changed(&self, state: &mut State<T>) {
-        state.filter.forget_others(T::one());
         let sc = &mut state.schedule;
+        sc.forget(parameters::OTHERS, T::one());
         sc.stage = 0;
         sc.before_rest = 0;
         sc.used = 0;
         sc.uses_of_symmetry = 0;
         sc.refused = 0;
         sc.angle_used = 0;
-        sc.commit = state::Commit::None;
         sc.settle = self.cycles(3) / 2;
         sc.fresh = 0;
         state.trial = [T::zero(); parameters::N];
@@ -298,9 +303,8 @@ impl<T: Float> Calibrator<T> {
     }
 
     fn cycles(&self, seconds: u16) -> u16 {
-        let per_second = 1.0 / self.cycle_s.to_f64();
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 100 a second, for seconds")]
-        let cycles = (f64::from(seconds) * per_second) as u16;
+        #[allow(clippy::cast_possible_truncation, reason = "at most 100 a second, for seconds")]
+        let cycles = ((u32::from(seconds) * self.cycles_per_65536_s) >> 16) as u16;
         cycles
     }
 }

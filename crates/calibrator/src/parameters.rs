@@ -87,34 +87,39 @@ impl Parameter {
     }
 
     /// Standard deviation that is expected of devices: the unit of the filter. Its square is the ceiling of forgetting.
+    #[inline]
     pub fn expected<T: Float>(self) -> T {
-        T::from_f64(match self {
-            P::OffsetX | P::OffsetY => 1e-3,
-            P::Cubic => 7.5e-3,
-            P::ForceScale | P::Damping | P::QuadratureRate => 0.1,
-            P::ForceRatio => 0.04,
-            P::ForceSkew | P::ForceRotation => 8e-3,
-            P::ForcePhase => 0.02,
-            P::ForcePhaseDifference | P::DetectionPhase | P::AnisodampingCos | P::AnisodampingSin => 0.01,
-            P::SplitCos | P::SplitSin => 2.0,
-            P::Rate => 0.02,
-            P::DetectionRatio => 0.03,
-            P::DetectionSkew => 6e-3,
-        })
+        // number by number: firmware converts none at run time
+        let c = T::from_f64;
+        match self {
+            P::OffsetX | P::OffsetY => c(1e-3),
+            P::Cubic => c(7.5e-3),
+            P::ForceScale | P::Damping | P::QuadratureRate => c(0.1),
+            P::ForceRatio => c(0.04),
+            P::ForceSkew | P::ForceRotation => c(8e-3),
+            P::ForcePhase => c(0.02),
+            P::ForcePhaseDifference | P::DetectionPhase | P::AnisodampingCos | P::AnisodampingSin => c(0.01),
+            P::SplitCos | P::SplitSin => c(2.0),
+            P::Rate => c(0.02),
+            P::DetectionRatio => c(0.03),
+            P::DetectionSkew => c(6e-3),
+        }
     }
 
     /// What it may wander, per √s: the floor of forgetting.
+    #[inline]
     pub fn wander<T: Float>(self) -> T {
-        T::from_f64(match self {
-            P::OffsetX | P::OffsetY => 2e-7,
-            P::Cubic | P::AnisodampingCos | P::AnisodampingSin | P::QuadratureRate => 1e-6,
-            P::ForceScale => 1e-5,
-            P::ForceRatio | P::ForceSkew | P::DetectionRatio | P::DetectionSkew => 1.2e-5,
-            P::ForceRotation => 2e-6,
-            P::ForcePhase | P::ForcePhaseDifference | P::DetectionPhase => 1e-6,
-            P::Damping | P::Rate => 3e-6,
-            P::SplitCos | P::SplitSin => 3e-5,
-        })
+        let c = T::from_f64;
+        match self {
+            P::OffsetX | P::OffsetY => c(2e-7),
+            P::Cubic | P::AnisodampingCos | P::AnisodampingSin | P::QuadratureRate => c(1e-6),
+            P::ForceScale => c(1e-5),
+            P::ForceRatio | P::ForceSkew | P::DetectionRatio | P::DetectionSkew => c(1.2e-5),
+            P::ForceRotation => c(2e-6),
+            P::ForcePhase | P::ForcePhaseDifference | P::DetectionPhase => c(1e-6),
+            P::Damping | P::Rate => c(3e-6),
+            P::SplitCos | P::SplitSin => c(3e-5),
+        }
     }
 }
 

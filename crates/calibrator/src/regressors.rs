@@ -11,121 +11,127 @@
 
 use cvg_model::{Float, Pendulum};
 
-use crate::parameters::{N, Parameter, Vector, get, set};
+use crate::parameters::{OTHERS, Parameter, Vector, get};
 use crate::window::{Push, Sample};
 
 /// Amplitude, angle, ellipticity.
 pub(crate) const CHANNELS: usize = 3;
 
-/// Rates of channel `c` per expected unit of each parameter, and what shows at once.
+/// A channel's row is made in this many parts: the readout; two of the drives; two of the mechanics.
+pub(crate) const PARTS: usize = 5;
+/// The first parameter of each, and the first after them. Detection has no part: what excites it is [`turned`].
+const FIRST: [usize; PARTS + 1] = [
+    0,
+    Parameter::ForceScale as usize,
+    Parameter::ForceRotation as usize,
+    Parameter::Damping as usize,
+    Parameter::SplitCos as usize,
+    OTHERS,
+];
+const LARGEST: usize = 4;
+
+/// A part of a channel's row: what each of some parameters does, in its own unit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part<T> {
+    pub(crate) first: usize,
+    pub(crate) end: usize,
+    /// rates
+    pub(crate) rate: [T; LARGEST],
+    /// what shows at once
+    pub(crate) direct: [T; LARGEST],
+}
+
+/// Part `n` of channel `c`'s row.
 ///
 /// Without a precession that is known, force scale, damping and split are one thing: then, without `scaled_forces`, the
 /// scale is not excited, and the others are what they are in units of the force.
-pub(crate) fn rates<T: Float>(
-    s: &Sample<T>,
-    known: &Vector<T>,
-    c: usize,
-    scaled_forces: bool,
-) -> (Vector<T>, Vector<T>) {
-    let zero = T::zero();
-    let (quarter, half, one) = (T::ratio(1, 4), T::half(), T::one());
+#[inline]
+pub(crate) fn part<T: Float>(s: &Sample<T>, known: &Vector<T>, c: usize, scaled_forces: bool, n: usize) -> Part<T> {
+    let at = |k: usize| FIRST.get(k).copied().unwrap_or(OTHERS);
+    let mut direct = [T::zero(); LARGEST];
+    let rate = match n {
+        0 => of_the_readout(s, known, c, &mut direct),
+        1 => of_the_drives(s, c, scaled_forces),
+        2 => of_their_phases(s, c),
+        3 => of_the_damping(s, c),
+        _ => of_the_split(s, c),
+    };
+    Part { first: at(n), end: at(n + 1), rate, direct }
+}
+
+/// Offsets and cubic, with what shows of them at once.
+fn of_the_readout<T: Float>(s: &Sample<T>, known: &Vector<T>, c: usize, direct: &mut [T; LARGEST]) -> [T; LARGEST] {
+    let (zero, quarter) = (T::zero(), T::ratio(1, 4));
     let (c1, s1, c2, s2) = (s.cos, s.sin, s.cos_2, s.sin_2);
     let (c4, s4) = (c2 * c2 - s2 * s2, T::two() * c2 * s2);
     let p = &s.push;
-    let along = [c1 * s.per_amplitude, s1 * s.per_amplitude, quarter * c4];
-    let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s4];
-    let chi = get(known, Parameter::SplitCos) * c2 + get(known, Parameter::SplitSin) * s2;
-    let readout = |at: usize| {
-        let (a, t) = (along.get(at).copied().unwrap_or(zero), across.get(at).copied().unwrap_or(zero));
-        match c {
-            0 => a * p.along - t * p.aside,
-            1 => t * p.along + a * p.aside,
-            _ => t * chi + a * p.quadrature,
+    let along = [c1 * s.per_amplitude, s1 * s.per_amplitude, quarter * c4, zero];
+    let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s4, zero];
+    // of the share along the pattern, and of that across it
+    let (of_along, of_across) = match c {
+        0 => {
+            *direct = along;
+            (p.along, -p.aside)
         }
+        1 => {
+            *direct = across;
+            (p.aside, p.along)
+        }
+        _ => (p.quadrature, get(known, Parameter::SplitCos) * c2 + get(known, Parameter::SplitSin) * s2),
     };
+    let mut rate = [zero; LARGEST];
+    for ((rate, a), t) in rate.iter_mut().zip(along).zip(across) {
+        *rate = a * of_along + t * of_across;
+    }
+    rate
+}
+
+/// Scale, ratio and skew.
+fn of_the_drives<T: Float>(s: &Sample<T>, c: usize, scaled_forces: bool) -> [T; LARGEST] {
+    let (c1, s1, p, zero) = (s.cos, s.sin, &s.push, T::zero());
     let fx = p.along * c1 - p.aside * s1;
     let fy = p.along * s1 + p.aside * c1;
-    let gx = p.across * c1 - p.quadrature * s1;
+    let [scale, ratio, skew] = match c {
+        0 => [p.along, fy * s1, fx * s1],
+        1 => [p.aside, fy * c1, fx * c1],
+        _ => {
+            let gx = p.across * c1 - p.quadrature * s1;
+            let gy = p.across * s1 + p.quadrature * c1;
+            [p.quadrature, gy * c1, gx * c1]
+        }
+    };
+    [if scaled_forces { scale } else { zero }, ratio, skew, zero]
+}
+
+/// Rotation of the forces' frame, phase and phase difference.
+fn of_their_phases<T: Float>(s: &Sample<T>, c: usize) -> [T; LARGEST] {
+    let (c1, s1, p, zero) = (s.cos, s.sin, &s.push, T::zero());
     let gy = p.across * s1 + p.quadrature * c1;
-    // offsets, cubic; scale, ratio, skew, rotation, phase, phase difference; damping; split; constant rates; detection
-    let mut h: Vector<T> = match c {
-        0 => [
-            readout(0),
-            readout(1),
-            readout(2),
-            p.along,
-            fy * s1,
-            fx * s1,
-            -p.aside,
-            p.across,
-            gy * s1,
-            -one,
-            -c2,
-            -s2,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-        ],
-        1 => [
-            readout(0),
-            readout(1),
-            readout(2),
-            p.aside,
-            fy * c1,
-            fx * c1,
-            p.along,
-            p.quadrature,
-            gy * c1,
-            zero,
-            s2,
-            -c2,
-            c2 * s.r,
-            s2 * s.r,
-            zero,
-            one,
-            zero,
-            zero,
-            zero,
-        ],
-        _ => [
-            readout(0),
-            readout(1),
-            readout(2),
-            p.quadrature,
-            gy * c1,
-            gx * c1,
-            p.across,
-            -p.aside,
-            -(fy * c1),
-            zero,
-            zero,
-            zero,
-            -(half * s2),
-            half * c2,
-            one,
-            zero,
-            zero,
-            zero,
-            zero,
-        ],
-    };
-    if !scaled_forces {
-        set(&mut h, Parameter::ForceScale, zero);
+    match c {
+        0 => [-p.aside, p.across, gy * s1, zero],
+        1 => [p.along, p.quadrature, gy * c1, zero],
+        _ => [p.across, -p.aside, -((p.along * s1 + p.aside * c1) * c1), zero],
     }
-    let mut direct = [zero; N];
-    let shown = match c {
-        0 => along,
-        1 => across,
-        _ => [zero; 3],
-    };
-    for (slot, value) in direct.iter_mut().zip(shown) {
-        *slot = value;
+}
+
+/// Damping and anisodamping.
+fn of_the_damping<T: Float>(s: &Sample<T>, c: usize) -> [T; LARGEST] {
+    let zero = T::zero();
+    match c {
+        0 => [-T::one(), -s.cos_2, -s.sin_2, zero],
+        1 => [zero, s.sin_2, -s.cos_2, zero],
+        _ => [zero; LARGEST],
     }
-    (scaled(h), scaled(direct))
+}
+
+/// Split, constant rates of quadrature and of the pattern.
+fn of_the_split<T: Float>(s: &Sample<T>, c: usize) -> [T; LARGEST] {
+    let (zero, half, one) = (T::zero(), T::half(), T::one());
+    match c {
+        0 => [zero; LARGEST],
+        1 => [s.cos_2 * s.r, s.sin_2 * s.r, zero, one],
+        _ => [-(half * s.sin_2), half * s.cos_2, one, zero],
+    }
 }
 
 /// What a turn of `turn` rad that no force explains shows of the detection in channel `c`: half of it at this cycle's
@@ -177,11 +183,4 @@ pub(crate) fn exact_rates<T: Float>(push: &Push<T>, p: &Pendulum<T>, (c2, s2): (
         (f.aside * cos + f.across * sin - d3 + half * chi * sin_2e) / cos_2e + k(Parameter::Rate),
         f.quadrature * cos - f.along * sin + d2 * sin_2e + half * k3 + q0 * cos_2e,
     ]
-}
-
-fn scaled<T: Float>(mut h: Vector<T>) -> Vector<T> {
-    for (slot, p) in h.iter_mut().zip(Parameter::ALL) {
-        *slot = *slot * p.expected();
-    }
-    h
 }

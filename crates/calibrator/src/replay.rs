@@ -95,7 +95,7 @@ impl<T: Float> Replay<T> {
         }
         s.schedule = Schedule { stage, ..Schedule::new(0) };
         s.before.whole = false;
-        s.sums = Sums::empty();
+        s.sums = Sums::after(s.direction);
         s.step = 0;
         (self.learning, self.follows, self.turning, self.precessing) = (learning, false, 0, 0);
     }
@@ -119,6 +119,9 @@ impl<T: Float> Replay<T> {
         let (sin, cos) = p.angle().sin_cos();
         let now = if e.x_c * cos + e.y_c * sin < T::zero() { (-cos, -sin) } else { (cos, sin) };
         let before = if self.follows { s.direction } else { now };
+        if !self.follows {
+            s.sums.begin(now);
+        }
         let push = c.pushed(s, &p, now, forces);
         let known = s.correction.known;
         s.sums.add_exactly(&p, now, before, &push, self.held, &known);
@@ -130,7 +133,7 @@ impl<T: Float> Replay<T> {
         }
         s.step = 0;
         s.closed = s.sums;
-        s.sums = Sums::empty();
+        s.sums = Sums::after(now);
         Some(self.cycle())
     }
 
@@ -141,15 +144,15 @@ impl<T: Float> Replay<T> {
         if !s.schedule.live {
             return seen;
         }
-        c.direct(s);
-        c.integrate(s, 1);
+        s.closed.direct(&mut s.sample);
+        c.integrate_all(s, 1);
         let doubt = self.doubt.unwrap_or_else(|| Doubt::of(s));
         // a pass has no stages to go back to
         let stage = core::mem::replace(&mut s.schedule.stage, 1);
         c.notice(s, doubt);
         s.schedule.stage = stage;
-        c.integrate(s, 0);
-        c.integrate(s, 2);
+        c.integrate_all(s, 0);
+        c.integrate_all(s, 2);
         for channel in 0..CHANNELS {
             if let Some(levels) = self.levels {
                 s.filter.noise = levels;

@@ -16,6 +16,7 @@ const TURNING_S: u16 = 20;
 const WORSE: i32 = 20;
 
 impl<T: Float> Calibrator<T> {
+    #[inline(never)]
     pub(crate) fn plan(&self, s: &mut State<T>) {
         let sc = &mut s.schedule;
         sc.profile = sc.profile.wrapping_add(1);

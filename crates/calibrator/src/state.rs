@@ -2,8 +2,9 @@
 
 use cvg_model::Float;
 
-use crate::correction::Correction;
-use crate::parameters::{N, OTHERS, Vector};
+use crate::correction::{Correction, Move};
+use crate::cycle::Doubt;
+use crate::parameters::{N, Vector};
 use crate::regressors::CHANNELS;
 use crate::ud::{Growth, Ud, Update};
 use crate::window::{Sample, Sums};
@@ -12,7 +13,7 @@ use crate::window::{Sample, Sums};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Filter<T> {
     pub(crate) ud: Ud<T>,
-    pub(crate) update: Update<T>,
+    pub(crate) work: Work<T>,
     pub(crate) growth: Growth<T>,
     pub(crate) mean: Vector<T>,
     /// what each parameter should have shown since the integrals began, forgotten slowly
@@ -24,8 +25,28 @@ pub(crate) struct Filter<T> {
     pub(crate) innovation: [T; CHANNELS],
     pub(crate) last_innovation: [T; CHANNELS],
     pub(crate) spread: T,
-    /// innovations of the angle over what was expected of them, squared, slowly averaged
+    /// what the mean says of this cycle, while a channel is integrated part by part
+    pub(crate) believed: T,
+    /// whose turn it is to have wandered
     pub(crate) growing: usize,
+}
+
+/// What is under way over several control steps: one thing at a time, so that they share their room.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Work<T> {
+    /// a measurement
+    Measure(Update<T>),
+    /// a commit, moved into the compensation
+    Move(Move<T>),
+}
+
+impl<T: Float> Work<T> {
+    pub(crate) fn update(&mut self) -> Option<&mut Update<T>> {
+        match self {
+            Self::Measure(update) => Some(update),
+            Self::Move(_) => None,
+        }
+    }
 }
 
 /// What is kept of the cycle before.
@@ -61,6 +82,7 @@ pub(crate) struct Schedule<T> {
     /// rotation since the last commit, back and forth, rad
     pub(crate) swept: T,
     pub(crate) rate: T,
+    pub(crate) doubt: Doubt<T>,
     pub(crate) profile: u32,
     pub(crate) fresh: u16,
     /// twice the innovations beyond all expectation, less those within
@@ -73,6 +95,16 @@ pub(crate) struct Schedule<T> {
     pub(crate) live: bool,
     pub(crate) accept: bool,
     pub(crate) commit: Commit,
+    pub(crate) forgetting: Forgetting<T>,
+}
+
+/// What a [`Commit::Forget`] is on its way to: the first `count` parameters of variance `d` each, and told by nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Forgetting<T> {
+    pub(crate) count: u8,
+    /// columns of the covariance that are done; one more is the mean
+    pub(crate) done: u8,
+    pub(crate) d: T,
 }
 
 /// What this cycle's control steps are spent on.
@@ -83,6 +115,8 @@ pub(crate) enum Commit {
     Forth,
     /// takes the last one back
     Back,
+    /// forgets, to the end of the cycle in which that is done
+    Forget,
 }
 
 /// What the calibrator remembers.
@@ -110,7 +144,7 @@ impl<T: Float> Filter<T> {
         let zero = T::zero();
         Self {
             ud: Ud::diagonal(T::one()),
-            update: Update::idle(),
+            work: Work::Measure(Update::idle()),
             growth: Growth::idle(),
             mean: [zero; N],
             shown: [[zero; N]; CHANNELS],
@@ -119,15 +153,8 @@ impl<T: Float> Filter<T> {
             innovation: [zero; CHANNELS],
             last_innovation: [zero; CHANNELS],
             spread: T::one(),
+            believed: zero,
             growing: 0,
-        }
-    }
-
-    /// All but the detection is as unknown as `variance`, in expected units squared.
-    pub(crate) fn forget_others(&mut self, variance: T) {
-        self.ud.reset(OTHERS, variance);
-        for mean in self.mean.iter_mut().take(OTHERS) {
-            *mean = T::zero();
         }
     }
 
@@ -164,6 +191,7 @@ impl<T: Float> Schedule<T> {
             turn: zero,
             swept: zero,
             rate: zero,
+            doubt: Doubt { force_scale: zero, rate: zero },
             profile: 0,
             fresh: 0,
             refused: 0,
@@ -173,6 +201,7 @@ impl<T: Float> Schedule<T> {
             live: false,
             accept: false,
             commit: Commit::None,
+            forgetting: Forgetting { count: 0, done: 0, d: T::one() },
         }
     }
 }

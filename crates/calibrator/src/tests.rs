@@ -14,11 +14,13 @@ use cvg_model::Envelope;
 
 use crate::complex::Complex;
 use crate::parameters::{N, Parameter, Vector};
+use crate::regressors::{PARTS, part};
+use crate::window::Sample;
 use crate::{Calibrator, Settings};
 
 /// No two of the settings are the same number, and none is one.
 pub(crate) fn settings() -> Settings {
-    Settings { amplitude_v: 1.6, drive_per_s: 2.5, damping_per_s: 0.04, ..Settings::default() }
+    Settings { amplitude_v: 1.6, drive_per_s: 2.5, damping_per_s: 0.04, steps: 80, ..Settings::default() }
 }
 
 pub(crate) fn calibrator() -> Calibrator<f64> {
@@ -62,6 +64,19 @@ fn what_is_expected_of_a_device_and_what_may_wander() {
     ];
     assert_eq!(Parameter::ALL.map(|p| (p.expected::<f64>(), p.wander::<f64>())), table);
     assert_eq!(Parameter::ALL.map(|p| p as usize), core::array::from_fn(|j| j));
+}
+
+/// A channel's whole row, and what shows at once.
+fn rates(s: &Sample<f64>, known: &Vector<f64>, c: usize, scaled_forces: bool) -> (Vector<f64>, Vector<f64>) {
+    let (mut h, mut direct) = ([0.0; N], [0.0; N]);
+    for n in 0..PARTS {
+        let part = part(s, known, c, scaled_forces, n);
+        for (k, j) in (part.first..part.end).enumerate() {
+            let unit = Parameter::ALL[j].expected::<f64>();
+            (h[j], direct[j]) = (part.rate[k] * unit, part.direct[k] * unit);
+        }
+    }
+    (h, direct)
 }
 
 /// One parameter moved by a value in its own unit.

@@ -1,11 +1,24 @@
 //! A covariance that can't lose its sign: P = U D Uᵀ, U unit upper triangular, D diagonal and positive (Bierman 1977).
 //!
 //! A measurement is taken in three parts, so that no control step does more than a few columns: [`Ud::project`] column
-//! by column, then [`Ud::open`], then [`Ud::absorb`] column by column. It refuses to know what the parameters mean.
+//! by column, then [`Ud::open`], then [`Ud::absorb`] column by column ([`Ud::measure`] does all at once). It refuses to know what the parameters mean.
 
 use cvg_model::Float;
 
 use crate::parameters::N;
+
+/// The same for every column, which is a constant called `J` there.
+macro_rules! each_column {
+    ($column:ident => $body:block) => {
+        each_column!($column => $body; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18)
+    };
+    ($column:ident => $body:block; $($j:literal)+) => {
+        $({
+            const $column: usize = $j;
+            $body
+        })+
+    };
+}
 
 /// Columns of U above its diagonal, one after the other.
 pub const ABOVE: usize = N * (N - 1) / 2;
@@ -27,14 +40,17 @@ pub struct Update<T> {
     /// variance of the innovation so far
     alpha: T,
     inverse: T,
-    noise: T,
+    /// of the column that is being absorbed: −f/α, and D f
+    lambda: T,
+    v: T,
 }
 
 impl<T: Float> Update<T> {
     /// Nothing taken yet.
     pub fn idle() -> Self {
         let zeros = [T::zero(); N];
-        Self { f: zeros, gain: zeros, alpha: T::zero(), inverse: T::zero(), noise: T::zero() }
+        let zero = T::zero();
+        Self { f: zeros, gain: zeros, alpha: zero, inverse: zero, lambda: zero, v: zero }
     }
 
     /// What the innovation is to be divided by for the gain; 0 before the last column.
@@ -88,7 +104,20 @@ impl<T: Float> Ud<T> {
 
     /// P_jj.
     pub fn variance(&self, j: usize) -> T {
-        self.covariance(j, j)
+        self.variance_by(j, j, N)
+    }
+
+    /// The share of columns `first` to `end` − 1 in P_jj: their sum is all of it.
+    pub fn variance_by(&self, j: usize, first: usize, end: usize) -> T {
+        let mut sum = if first <= j && j < end { self.d(j) } else { T::zero() };
+        let first = if first > j { first } else { j + 1 };
+        let mut at = bounds(first).0 + j;
+        for (k, d) in (first..).zip(self.d.get(first..end).unwrap_or(&[])) {
+            let u = self.above.get(at).copied().unwrap_or(T::zero());
+            sum = sum + u * u * *d;
+            at += k;
+        }
+        sum
     }
 
     /// hᵀPh.
@@ -102,14 +131,23 @@ impl<T: Float> Ud<T> {
         self.column(j).iter().zip(h).fold(along, |sum, (u, h)| sum + *u * *h)
     }
 
-    /// Column `j` of the first pass: f_j = (Uᵀh)_j. Returns what it adds to the innovation's variance.
-    #[inline]
-    pub fn project(&self, update: &mut Update<T>, h: &[T; N], j: usize) -> T {
-        let f = self.projected(h, j);
-        if let Some(slot) = update.f.get_mut(j) {
+    /// A whole measurement of `h` with a noise of variance `noise`.
+    pub fn measure(&mut self, update: &mut Update<T>, h: &[T; N], noise: T) {
+        each_column!(J => { self.project::<J>(update, h); });
+        self.open(update, noise);
+        each_column!(J => { self.absorb::<J>(update); });
+    }
+
+    /// Column `J` of the first pass: f_J = (Uᵀh)_J. Returns what it adds to the innovation's variance.
+    ///
+    /// The column is known when it is compiled, here and below: half of what firmware does would else be the loop's own.
+    #[inline(always)]
+    pub fn project<const J: usize>(&self, update: &mut Update<T>, h: &[T; N]) -> T {
+        let f = self.projected(h, J);
+        if let Some(slot) = update.f.get_mut(J) {
             *slot = f;
         }
-        self.d(j) * f * f
+        self.d(J) * f * f
     }
 
     /// Between the passes: the measurement's variance is `noise` > 0.
@@ -117,34 +155,51 @@ impl<T: Float> Ud<T> {
     pub fn open(&self, update: &mut Update<T>, noise: T) {
         update.alpha = noise;
         update.inverse = T::one() / noise;
-        update.noise = noise;
+    }
+
+    /// Column `J` of the second pass, from 0 to N − 1.
+    #[inline(always)]
+    pub fn absorb<const J: usize>(&mut self, update: &mut Update<T>) {
+        self.absorb_diagonal::<J>(update);
+        self.absorb_rows::<J, 0, J>(update);
     }
 
     //= specs/self-calibration.md#positive
     //# The covariance MUST stay positive through every measurement and every step of its growth.
-    /// Column `j` of the second pass, from 0 to N − 1.
-    #[inline]
-    pub fn absorb(&mut self, update: &mut Update<T>, j: usize) {
-        let Some(f) = update.f.get(j).copied() else { return };
-        let d = self.d(j);
+    /// What [`Ud::absorb`] begins with; every row above the diagonal follows.
+    #[inline(always)]
+    pub fn absorb_diagonal<const J: usize>(&mut self, update: &mut Update<T>) {
+        let Some(f) = update.f.get(J).copied() else { return };
+        let d = self.d(J);
         let v = d * f;
         let before = update.alpha;
         let alpha = before + v * f;
-        let lambda = -(f * update.inverse);
+        update.lambda = -(f * update.inverse);
         let inverse = T::one() / alpha;
         update.alpha = alpha;
         update.inverse = inverse;
-        if let Some(slot) = self.d.get_mut(j) {
+        update.v = v;
+        if let Some(slot) = self.d.get_mut(J) {
             // the ratio is in (0, 1]: a product of positive numbers can't change its sign, and not vanish either
             *slot = at_least(d * (before * inverse));
         }
-        for (u, k) in self.column_mut(j).iter_mut().zip(update.gain.iter_mut()) {
+        if let Some(slot) = update.gain.get_mut(J) {
+            *slot = v;
+        }
+    }
+
+    /// Rows `FIRST` to `END` − 1 of column `J`.
+    #[inline(always)]
+    pub fn absorb_rows<const J: usize, const FIRST: usize, const END: usize>(&mut self, update: &mut Update<T>) {
+        let (lambda, v) = (update.lambda, update.v);
+        let (Some(column), Some(gain)) = (self.column_mut(J).get_mut(FIRST..END), update.gain.get_mut(FIRST..END))
+        else {
+            return;
+        };
+        for (u, k) in column.iter_mut().zip(gain) {
             let old = *u;
             *u = old + *k * lambda;
             *k = *k + v * old;
-        }
-        if let Some(slot) = update.gain.get_mut(j) {
-            *slot = v;
         }
     }
 
@@ -160,10 +215,19 @@ impl<T: Float> Ud<T> {
 
     /// One column more; nothing when all is spread.
     pub fn grow(&mut self, growth: &mut Growth<T>) {
-        let Some(j) = growth.next.checked_sub(1) else { return };
-        growth.next = j;
-        let Some(s) = growth.a.get(j).copied() else { return };
-        let d = self.d(j);
+        let next = growth.next;
+        each_column!(J => {
+            if next == J + 1 {
+                self.grow_column::<J>(growth);
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn grow_column<const J: usize>(&mut self, growth: &mut Growth<T>) {
+        growth.next = J;
+        let Some(s) = growth.a.get(J).copied() else { return };
+        let d = self.d(J);
         let sum = d + growth.q * s * s;
         if !(sum > T::zero() && sum.is_finite()) {
             growth.next = 0;
@@ -171,26 +235,25 @@ impl<T: Float> Ud<T> {
         }
         let b = growth.q * s / sum;
         growth.q = growth.q * (d / sum);
-        if let Some(slot) = self.d.get_mut(j) {
+        if let Some(slot) = self.d.get_mut(J) {
             *slot = at_least(sum);
         }
-        for (u, a) in self.column_mut(j).iter_mut().zip(growth.a.iter_mut()) {
+        for (u, a) in self.column_mut(J).iter_mut().zip(growth.a.iter_mut()) {
             *a = *a - s * *u;
             *u = *u + b * *a;
         }
     }
 
-    /// The first `count` parameters independent of all and of variance `d`; the others keep their own covariance.
-    pub fn reset(&mut self, count: usize, d: T) {
-        for j in 0..N {
-            if j < count
-                && let Some(slot) = self.d.get_mut(j)
-            {
-                *slot = d;
-            }
-            for u in self.column_mut(j).iter_mut().take(count) {
-                *u = T::zero();
-            }
+    /// Column `j` where the first `count` parameters become independent of all and of variance `d`; the others keep their own
+    /// covariance. Forgets what it says once every column is done.
+    pub fn forget(&mut self, j: usize, count: usize, d: T) {
+        if j < count
+            && let Some(slot) = self.d.get_mut(j)
+        {
+            *slot = d;
+        }
+        for u in self.column_mut(j).iter_mut().take(count) {
+            *u = T::zero();
         }
     }
 

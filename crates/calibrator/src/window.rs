@@ -12,13 +12,14 @@ use crate::regressors::{exact_rates, known_rates};
 pub(crate) struct Sums<T> {
     energy: T,
     quadrature: T,
-    /// of the angle since the first step
+    /// of the angle since the step before the first
     turned: T,
     push: [T; 4],
     /// known rates of the three channels, and the same weighted by how far into the cycle they act
     rate: [T; 3],
     ramp: [T; 3],
-    first: (T, T),
+    /// the direction in the step before the first
+    from: (T, T),
     angle: T,
     count: T,
     whole: bool,
@@ -37,8 +38,10 @@ pub(crate) struct Push<T> {
 /// One cycle, as it enters the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sample<T> {
-    /// ½ ln E, rad of the pattern, ellipticity
+    /// ½ ln E, rad of the pattern since the step before, ellipticity
     pub(crate) y: [T; 3],
+    /// the mean angle as the next cycle counts it: since the last step of this one
+    pub(crate) before_next: T,
     pub(crate) per_amplitude: T,
     /// ½Q/√(E² − Q²)
     pub(crate) r: T,
@@ -54,8 +57,9 @@ pub(crate) struct Sample<T> {
 }
 
 impl<T: Float> Sums<T> {
-    pub(crate) fn empty() -> Self {
-        let (zero, one) = (T::zero(), T::one());
+    /// A cycle begins after a step in which the direction was `from`.
+    pub(crate) fn after(from: (T, T)) -> Self {
+        let zero = T::zero();
         Self {
             energy: zero,
             quadrature: zero,
@@ -63,7 +67,7 @@ impl<T: Float> Sums<T> {
             push: [zero; 4],
             rate: [zero; 3],
             ramp: [zero; 3],
-            first: (one, zero),
+            from,
             angle: zero,
             count: zero,
             whole: true,
@@ -107,13 +111,10 @@ impl<T: Float> Sums<T> {
         held: T,
         rates: impl FnOnce(&Push<T>, (T, T)) -> [T; 3],
     ) {
-        // sine of the turn since the step before: far below a radian
-        let x = now.1 * before.0 - now.0 * before.1;
-        if self.count == T::zero() {
-            self.first = now;
-        } else {
-            self.angle = self.angle + x + x * x * x * T::ratio(1, 6);
-        }
+        // sine of the turn since the step before, far below a radian; of differences, so that it is as precise as it is small
+        let x = (now.1 - before.1) * before.0 - (now.0 - before.0) * before.1;
+        let x2 = x * x;
+        self.angle = self.angle + x + x * x2 * (T::ratio(1, 6) + x2 * T::ratio(3, 40));
         self.count = self.count + T::one();
         self.turned = self.turned + self.angle;
         let excess = p.e - T::one();
@@ -131,6 +132,11 @@ impl<T: Float> Sums<T> {
             *sum = *sum + rate;
             *ramp = *ramp + rate * self.count;
         }
+    }
+
+    /// The first step is one after which nothing is known: it does not turn.
+    pub(crate) fn begin(&mut self, direction: (T, T)) {
+        self.from = direction;
     }
 
     /// Not a whole cycle: something happened in it.
@@ -166,6 +172,7 @@ impl<T: Float> Sums<T> {
         let zero = T::zero();
         Some(Sample {
             y: [half_log(excess), zero, T::half() * q * (T::one() + q * q * T::ratio(1, 6))],
+            before_next: zero,
             per_amplitude,
             r: T::half() * q / (T::one() - q * q).sqrt(),
             push,
@@ -180,10 +187,12 @@ impl<T: Float> Sums<T> {
 
     /// The mean angle, and its cosines and sines.
     pub(crate) fn direct(&self, sample: &mut Sample<T>) {
-        let angle = self.first.1.atan2(self.first.0) + self.turned / self.count;
-        let (sin, cos) = angle.sin_cos();
+        let mean = self.turned / self.count;
+        let (sin, cos) = turn_of(mean);
+        let (cos, sin) = (self.from.0 * cos - self.from.1 * sin, self.from.1 * cos + self.from.0 * sin);
         let [_, y, _] = &mut sample.y;
-        *y = angle;
+        *y = mean;
+        sample.before_next = mean - self.angle;
         sample.cos = cos;
         sample.sin = sin;
         sample.cos_2 = cos * cos - sin * sin;
@@ -197,6 +206,7 @@ impl<T: Float> Sample<T> {
         let zero = T::zero();
         Self {
             y: [zero; 3],
+            before_next: zero,
             per_amplitude: T::one(),
             r: zero,
             push: Push { along: zero, aside: zero, quadrature: zero, across: zero },
@@ -227,6 +237,21 @@ impl<T: Float> Push<T> {
     pub(crate) fn over(&self, k: T) -> Self {
         Self { along: self.along * k, aside: self.aside * k, quadrature: self.quadrature * k, across: self.across * k }
     }
+}
+
+/// Sine and cosine of a turn of a cycle, in a few products: `libm` takes double precision, which firmware has no unit for.
+/// Domain: |x| ≤ π/2; error below 10⁻¹¹ there, and far below nearer to 0.
+pub(crate) fn turn_of<T: Float>(x: T) -> (T, T) {
+    let r = T::ratio;
+    let x = x * r(1, 4);
+    let x2 = x * x;
+    let mut sin = x * (T::one() - x2 * (r(1, 6) - x2 * (r(1, 120) - x2 * (r(1, 5040) - x2 * r(1, 362_880)))));
+    // 1 − cos: what is doubled has to be small
+    let mut less = x2 * (T::half() - x2 * (r(1, 24) - x2 * (r(1, 720) - x2 * (r(1, 40_320) - x2 * r(1, 3_628_800)))));
+    for _ in 0..2 {
+        (sin, less) = (T::two() * sin * (T::one() - less), T::two() * sin * sin);
+    }
+    (sin, T::one() - less)
 }
 
 /// ½ ln(1 + x) = artanh(x/(2 + x)). Domain: |x| ≤ 0.4; error below 10⁻⁸ there and far below nearer to 0.

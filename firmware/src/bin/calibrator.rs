@@ -24,7 +24,7 @@ use scalar::Single;
 
 /// Where QEMU loads the checksums of the host, one a second.
 const RECORDED: *const u32 = 0x2100_0000 as *const u32;
-const SLICES: usize = 80;
+const SLICES: usize = 160;
 
 struct Counts {
     empty: u32,

@@ -1,6 +1,7 @@
 //! Commits: what is moved, what is left, what is taken back, and what is kept over a night.
 
 use super::*;
+use crate::commit::DECIDE;
 use crate::correction::Correction;
 use crate::parameters::{OTHERS, Parameter as P};
 use crate::record::{BYTES, Refused};
@@ -13,13 +14,7 @@ pub(super) fn correlated(variance: f64) -> Ud<f64> {
     for k in 0..6 {
         let h: [f64; N] = core::array::from_fn(|j| ((j * 7 + k * 5) % 11) as f64 / 11.0 - 0.4);
         let mut update = Update::idle();
-        for j in 0..N {
-            ud.project(&mut update, &h, j);
-        }
-        ud.open(&mut update, 0.3 * variance);
-        for j in 0..N {
-            ud.absorb(&mut update, j);
-        }
+        ud.measure(&mut update, &h, 0.3 * variance);
     }
     ud
 }
@@ -34,10 +29,10 @@ fn due(stage: u8) -> State<f64> {
     s
 }
 
-/// The slices of a commit.
+/// The cycle of a commit.
 fn committed(mut s: State<f64>) -> State<f64> {
-    for k in 0..=40 {
-        s.step = k;
+    for step in 0..80 {
+        s.step = step;
         calibrator().work(&mut s);
     }
     s
@@ -314,9 +309,8 @@ fn a_split_is_symmetric_and_what_is_not_is_the_detections() {
         let mut s = before;
         s.schedule.uses_of_symmetry = uses;
         change(&mut s);
-        for k in 0..20 {
-            s.step = k;
-            calibrator().work(&mut s);
+        for k in 0..DECIDE {
+            calibrator().commit_slice(&mut s, k);
         }
         s
     };
@@ -344,6 +338,23 @@ fn a_split_is_symmetric_and_what_is_not_is_the_detections() {
     }
 }
 
+/// The slices that are left of the cycle once a commit is through would be those of a measurement that never began.
+#[test]
+fn after_a_commit_nothing_is_measured_to_the_end_of_the_cycle() {
+    let mut before = due(4);
+    (before.schedule.angle_used, before.filter.ud) = (251, Ud::diagonal(1e-3));
+    (before.correction.known[P::SplitCos as usize], before.correction.known[P::SplitSin as usize]) = (1.5, -2.5);
+    before.filter.mean = [0.0; N];
+    let mut through = before;
+    for k in 0..DECIDE {
+        calibrator().commit_slice(&mut through, k);
+    }
+    assert!(through.schedule.accept, "the symmetry was measured");
+    let after = committed(before);
+    assert!(after.filter.ud == through.filter.ud && after.filter.shown == through.filter.shown);
+    assert!(!after.before.whole);
+}
+
 #[test]
 fn a_change_of_the_split_forgets_the_mechanics_and_keeps_the_detection() {
     let mut s = due(4);
@@ -352,6 +363,8 @@ fn a_change_of_the_split_forgets_the_mechanics_and_keeps_the_detection() {
     (s.trial, s.score) = ([0.1; N], 3.0);
     let before = s;
     calibrator().split_changed(&mut s);
+    assert_eq!(s.schedule.commit, Commit::Forget);
+    let s = committed(s);
     for j in 0..N {
         let (mean, variance) =
             if j < OTHERS { (0.0, 1.0) } else { (before.filter.mean[j], before.filter.ud.variance(j)) };

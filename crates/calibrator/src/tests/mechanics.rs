@@ -9,7 +9,7 @@ use crate::Commands;
 use crate::complex::{Complex, Matrix};
 use crate::correction::Correction;
 use crate::parameters::Parameter as P;
-use crate::regressors::{exact_rates, known_rates, rates, turned};
+use crate::regressors::{exact_rates, known_rates, turned};
 use crate::window::{Push, Sample};
 
 const MECHANICAL: [P; 7] =

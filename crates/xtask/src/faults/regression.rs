@@ -43,15 +43,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a skew is added behind the ratio",
         "calibrator/src/correction.rs",
-        "y_of_x = y_of_x + y_of_y * step.yx;\n            y_of_y = y_of_y * step.yy;",
-        "y_of_y = y_of_y * step.yy;\n            y_of_x = y_of_x + y_of_y * step.yx;",
+        "self.to.y_of_x + self.to.y_of_y.times(self.yx);",
+        "self.to.y_of_x + (self.to.y_of_y * self.yy).times(self.yx);",
         TESTS,
     ),
     fault(
         "the mechanics are not seen through the new readout",
         "calibrator/src/correction.rs",
-        "set_mechanics(&mut known, &back.times(&mechanics(&self.known).times(&step)));",
-        "set_mechanics(&mut known, &back.times(&mechanics(&self.known)));",
+        "let seen = self.between(&mechanics(&self.to.known));",
+        "let seen = self.seen(&mechanics(&self.to.known));",
         TESTS,
     ),
     fault(
@@ -71,8 +71,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a device may be far from every other",
         "calibrator/src/correction.rs",
-        "&& near(drives.yx, zero, 0.2)\n",
-        "\n",
+        "&& near(drives.yx, zero, 0.2);\n",
+        ";\n",
         TESTS,
     ),
     fault(
@@ -85,29 +85,29 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a skew pushes across in one quadrant only",
         "calibrator/src/regressors.rs",
-        "fx * c1,\n            p.along,",
-        "fx * c1.magnitude(),\n            p.along,",
+        "1 => [p.aside, fy * c1, fx * c1],",
+        "1 => [p.aside, fy * c1, fx * c1.magnitude()],",
         TESTS,
     ),
     fault(
         "a phase of the forces has the wrong sign in the ellipticity",
         "calibrator/src/regressors.rs",
-        "            p.across,\n            -p.aside,\n            -(fy * c1),",
-        "            p.across,\n            p.aside,\n            -(fy * c1),",
+        "_ => [p.across, -p.aside,",
+        "_ => [p.across, p.aside,",
         TESTS,
     ),
     fault(
         "the cubic readout is that of twice the angle",
         "calibrator/src/regressors.rs",
-        "let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s4];",
-        "let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s2];",
+        "let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s4, zero];",
+        "let across = [-s1 * s.per_amplitude, c1 * s.per_amplitude, -quarter * s2, zero];",
         TESTS,
     ),
     fault(
         "an offset counts alike at every amplitude",
         "calibrator/src/regressors.rs",
-        "let along = [c1 * s.per_amplitude, s1 * s.per_amplitude, quarter * c4];",
-        "let along = [c1 * s.per_amplitude, s1, quarter * c4];",
+        "let along = [c1 * s.per_amplitude, s1 * s.per_amplitude, quarter * c4, zero];",
+        "let along = [c1 * s.per_amplitude, s1, quarter * c4, zero];",
         TESTS,
     ),
     fault(
@@ -127,15 +127,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the scale of the forces is excited where nothing tells it",
         "calibrator/src/regressors.rs",
-        "if !scaled_forces {",
-        "if !scaled_forces && c == 1 {",
+        "[if scaled_forces { scale }",
+        "[if scaled_forces || c == 0 { scale }",
         TESTS,
     ),
     fault(
         "what is measured leaves the last column",
         "calibrator/src/ud.rs",
-        "for (u, k) in self.column_mut(j).iter_mut().zip(update.gain.iter_mut()) {",
-        "for (u, k) in self.column_mut(j).iter_mut().zip(update.gain.iter_mut()).take(17) {",
+        "for (u, k) in column.iter_mut().zip(gain) {",
+        "for (u, k) in column.iter_mut().zip(gain).take(if END == 18 { 10 } else { END }) {",
         TESTS,
     ),
     fault(
