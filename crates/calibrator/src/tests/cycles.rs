@@ -166,7 +166,7 @@ fn each_stage_has_a_floor_of_its_own() {
         (s.filter.mean, s.filter.noise, s.schedule.fresh) = ([0.0; N], [1e-18; CHANNELS], 1);
         s.filter.shown[0] = unit(P::Damping, floor);
         s.filter.seen[0] = floor;
-        for k in 0..20 {
+        for k in 0..MEASURE {
             calibrator().measure(&mut s, 0, k);
         }
         near(s.filter.mean[P::Damping as usize], 0.5, 1e-6);
@@ -198,7 +198,7 @@ fn a_detection_is_told_while_it_turns() {
         for excited in [false, true] {
             let mut s = busy();
             (s.schedule.excited, s.schedule.untold) = (excited, 77);
-            for k in 0..20 {
+            for k in 0..MEASURE {
                 calibrator().measure(&mut s, c, k);
             }
             assert!(s.schedule.accept);
@@ -221,7 +221,8 @@ fn a_turn_in_the_first_stage_begins_it_anew() {
         let mut s = busy();
         (s.sample.push.aside, s.schedule.turn) = (0.0, 5.0 * 0.1 / 25.0);
         (s.schedule.stage, s.schedule.used, s.schedule.angle_used) = (stage, 99, 250);
-        calibrator().detect(&mut s);
+        let doubt = Doubt::of(&s);
+        calibrator().notice(&mut s, doubt);
         assert_eq!((s.schedule.excited, s.schedule.used), (true, used), "stage {stage}");
         let forgotten = s.filter.mean[..OTHERS].iter().all(|m| *m == 0.0);
         assert_eq!(forgotten, stage == 0);
@@ -232,7 +233,7 @@ fn a_turn_in_the_first_stage_begins_it_anew() {
 #[test]
 fn a_cycle_that_is_not_whole_is_not_the_one_before() {
     let mut s = busy();
-    s.closed = crate::window::Sums::empty();
+    s.closed = Sums::after((1.0, 0.0));
     s.closed.spoil();
     calibrator().close(&mut s);
     assert_eq!((s.schedule.live, s.before.whole, s.schedule.settle), (false, false, 37));
