@@ -12,7 +12,7 @@ use crate::state::{Commit, Filter, State, Work};
 
 /// The slices of a commit: the symmetry of the split as a measurement; what to move; the move.
 const PROJECT: u16 = 3;
-const WEIGH: u16 = PROJECT + OPEN - 1;
+pub(crate) const WEIGH: u16 = PROJECT + OPEN - 1;
 const LEARN: u16 = WEIGH + TAKEN - OPEN;
 pub(crate) const DECIDE: u16 = LEARN + 1;
 const DECIDE_PAIR: u16 = DECIDE + 1;

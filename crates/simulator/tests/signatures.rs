@@ -154,6 +154,37 @@ fn actuation_phase_turns_the_pattern_by_what_holds_the_split() {
 }
 
 #[test]
+fn drive_saturation_asks_for_more_energy_command_at_multiples_of_90_degrees() {
+    // the describing function, of a command over the level
+    let gain = |d: f64| {
+        if d > 1.0 {
+            ((1.0 / d).asin() + (1.0 / d) * (1.0 - 1.0 / (d * d)).sqrt()) / core::f64::consts::FRAC_PI_2
+        } else {
+            1.0
+        }
+    };
+    let run = |level: f64| {
+        let effect = format!(r#"{{ id = "drive-saturation", inverse_level = {:?} }}"#, 22.0 / level);
+        relative_energy_command(&effect, &[4.0, 8.0])[0]
+    };
+    assert!(run(1.02).amplitude() < 1e-5);
+    for level in [0.96, 0.93] {
+        let (mut theta, mut command) = (Vec::new(), Vec::new());
+        for i in 0..720 {
+            let (sin, cos) = (0.5 * f64::from(i)).to_radians().sin_cos();
+            let mut v = 1.0;
+            for _ in 0..200 {
+                let along = gain(v * cos.abs() / level) * cos * cos + gain(v * sin.abs() / level) * sin * sin;
+                v += 0.5 * (1.0 / along - v);
+            }
+            theta.push((0.5 * f64::from(i)).to_radians());
+            command.push(v);
+        }
+        close(run(level).cos, fit(&command, &[], &theta, &[4.0, 8.0]).1[0].cos);
+    }
+}
+
+#[test]
 fn detection_phase_turns_the_pattern_through_a_split_at_4_theta() {
     let axis = 20_f64.to_radians();
     let split = r#"{ id = "anisoelasticity", anisoelasticity = 0.25, theta_omega = 20.0 }"#;

@@ -20,24 +20,28 @@ pub(crate) struct Camera {
     pub(crate) aside_m: [f64; 2],
     /// scale of y over that of x; negative where y points down
     pub(crate) aspect: f64,
+    /// of the pinhole over the plane of rest, m; from far away it sees no perspective
+    pub(crate) height_m: f64,
 }
 
 impl Camera {
-    /// Of the pinhole over the plane of rest, m.
-    const HEIGHT_M: f64 = 1.2;
-    pub(crate) const UPRIGHT: Self = Self { tilt_rad: [0.0; 2], aside_m: [0.0; 2], aspect: 1.0 };
+    pub(crate) const FAR: Self = Self { tilt_rad: [0.0; 2], aside_m: [0.0; 2], aspect: 1.0, height_m: f64::INFINITY };
+    pub(crate) const NEAR: Self = Self { height_m: 1.2, ..Self::FAR };
 
     /// Where a mass at (x, y), on a sphere of the pendulum's length, is seen, pixels.
     fn sees(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let pixels = |x: f64, y: f64| [640.3 + PIXELS_PER_M * x, 361.8 + self.aspect * PIXELS_PER_M * y];
+        if self.height_m.is_infinite() {
+            return pixels(x, y);
+        }
         let l = Pendulum::length_m();
         let risen = l - (l * l - x * x - y * y).sqrt();
-        let (x, y, depth) = (x - self.aside_m[0], y - self.aside_m[1], Self::HEIGHT_M - risen);
+        let (x, y, depth) = (x - self.aside_m[0], y - self.aside_m[1], self.height_m - risen);
         let (sin, cos) = self.tilt_rad[0].sin_cos();
         let (x, depth) = (x * cos - depth * sin, depth * cos + x * sin);
         let (sin, cos) = self.tilt_rad[1].sin_cos();
         let (y, depth) = (y * cos - depth * sin, depth * cos + y * sin);
-        let focal_px = PIXELS_PER_M * Self::HEIGHT_M;
-        [640.3 + focal_px * x / depth, 361.8 + self.aspect * focal_px * y / depth]
+        pixels(self.height_m * x / depth, self.height_m * y / depth)
     }
 }
 

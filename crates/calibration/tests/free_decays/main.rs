@@ -182,7 +182,7 @@ fn filmed(pendulum: &Pendulum, seed: u64) -> Report {
 
 #[test]
 fn airys_precession_is_found_in_the_film_of_a_pendulum_and_the_rate_put_right() {
-    let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::UPRIGHT };
+    let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::FAR };
     for seed in 1..=6 {
         let report = filmed(&pendulum, seed);
         let decay = report.decay.as_ref().unwrap();
@@ -207,11 +207,11 @@ fn airys_precession_is_found_in_the_film_of_a_pendulum_and_the_rate_put_right() 
 fn the_rate_of_a_filmed_pendulum_is_right_through_a_tilted_camera_beside_it() {
     let degree = 1.0_f64.to_radians();
     let cameras = [
-        Camera { tilt_rad: [degree, 0.0], ..Camera::UPRIGHT },
-        Camera { tilt_rad: [0.0, degree], ..Camera::UPRIGHT },
-        Camera { tilt_rad: [degree, -degree], aside_m: [0.1, -0.05], aspect: -1.0 },
-        Camera { tilt_rad: [3.0 * degree, 2.0 * degree], aside_m: [0.1, 0.1], aspect: 1.0 },
-        Camera { aspect: 1.02, ..Camera::UPRIGHT },
+        Camera { tilt_rad: [degree, 0.0], ..Camera::NEAR },
+        Camera { tilt_rad: [0.0, degree], ..Camera::NEAR },
+        Camera { tilt_rad: [degree, -degree], aside_m: [0.1, -0.05], aspect: -1.0, ..Camera::NEAR },
+        Camera { tilt_rad: [3.0 * degree, 2.0 * degree], aside_m: [0.1, 0.1], ..Camera::NEAR },
+        Camera { aspect: 1.02, ..Camera::NEAR },
     ];
     for (seed, camera) in (1..).zip(cameras) {
         let report = filmed(&Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3, camera }, seed);
@@ -224,14 +224,18 @@ fn the_rate_of_a_filmed_pendulum_is_right_through_a_tilted_camera_beside_it() {
             decay.rms_deg,
             report.warnings
         );
-        assert_eq!(discovered(&report), ["spring-isotropic"]);
-        assert!((rate.value + RATE_DPH * camera.aspect.signum()).abs() < 2.0 * rate.half_width(), "{rate:?}");
+        // what rises is nearer to the pinhole: large swings look larger, which is what a damping that follows the energy does
+        let caused = report.effects.iter().filter(|e| e.origin == Origin::Discovered).map(|e| e.id.as_str());
+        assert_eq!(caused.collect::<Vec<_>>(), ["spring-isotropic"], "{:?}", discovered(&report));
+        // near one angle nothing tells a scale of y from the precession: the report says how much of it there is
+        assert!(report.warnings.iter().any(|w| w.contains("a scale of y that is 1 % larger")), "{:?}", report.warnings);
+        assert!((rate.value + RATE_DPH * camera.aspect).abs() < 2.0 * rate.half_width(), "{rate:?}");
     }
 }
 
 #[test]
 fn a_bowl_without_airys_precession_is_not_said_to_have_it() {
-    let bowl = Pendulum { spherical: false, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::UPRIGHT };
+    let bowl = Pendulum { spherical: false, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::FAR };
     for seed in 1..=12 {
         let report = filmed(&bowl, seed);
         assert_eq!(discovered(&report), [""; 0], "{:?}", report.effects);

@@ -1,7 +1,7 @@
 //! Commits: what is moved, what is left, what is taken back, and what is kept over a night.
 
 use super::*;
-use crate::commit::DECIDE;
+use crate::commit::{DECIDE, WEIGH};
 use crate::correction::Correction;
 use crate::parameters::{OTHERS, Parameter as P};
 use crate::record::{BYTES, Refused};
@@ -277,7 +277,7 @@ fn a_symmetry_is_used_where_it_tells_more_than_its_noise() {
             s.schedule.uses_of_symmetry = used;
             s.filter.spread = spread * noise;
             s.score = deviations * f64::sqrt((spread + 1.0) * noise);
-            calibrator().commit_slice(&mut s, 6);
+            calibrator().commit_slice(&mut s, WEIGH);
             (s.schedule.accept, s.schedule.uses_of_symmetry)
         };
         assert_eq!((weighed(3.99, 0.0), weighed(4.01, 0.0)), ((false, used), (true, used + 1)));

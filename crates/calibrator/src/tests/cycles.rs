@@ -181,7 +181,7 @@ fn a_channel_that_is_refused_for_a_second_begins_anew() {
             let mut s = busy();
             (s.schedule.hold[c], s.filter.seen[c]) = (held, 1e3);
             let before = s;
-            for k in 0..=6 {
+            for k in 0..=OPEN {
                 calibrator().measure(&mut s, c, k);
             }
             assert_eq!((s.schedule.accept, s.schedule.hold[c]), (false, after));
@@ -224,6 +224,11 @@ fn a_turn_in_the_first_stage_begins_it_anew() {
         let doubt = Doubt::of(&s);
         calibrator().notice(&mut s, doubt);
         assert_eq!((s.schedule.excited, s.schedule.used), (true, used), "stage {stage}");
+        assert_eq!(s.schedule.commit == Commit::Forget, stage == 0);
+        for k in 40..80 {
+            s.step = k;
+            calibrator().work(&mut s);
+        }
         let forgotten = s.filter.mean[..OTHERS].iter().all(|m| *m == 0.0);
         assert_eq!(forgotten, stage == 0);
     }
