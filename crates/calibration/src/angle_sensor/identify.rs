@@ -343,7 +343,7 @@ fn rate_finding(
         warnings
             .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
     }
-    warnings.extend(runs.iter().chain(held).filter_map(|run| rate_runs::parting(run, &model.left(run), model.late_s)));
+    warnings.extend(runs.iter().chain(held).filter_map(|run| rate_runs::parting(run, &model.left(run))));
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {

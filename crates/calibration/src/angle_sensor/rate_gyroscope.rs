@@ -14,7 +14,6 @@ use super::samples::{Reading, SensorRun};
 use super::selection::VARYING_RATE;
 use super::sensor::{Sensor, centred};
 use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::{median, robust_deviation};
 
 /// One of the three terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,10 +36,6 @@ const TOLD_FROM_A_LINE: f64 = 1e-4;
 const PARTS: usize = 5;
 /// Standard errors by which left-out parts have to be predicted worse than by nothing for a fit to be refused.
 const HARMS: f64 = 2.0;
-/// Standard deviations from which on a lag is told.
-const TOLD: f64 = 2.0;
-/// Rounds in which a lag is taken out of the reference.
-const ROUNDS: usize = 3;
 /// Rows that a part needs to be fitted with.
 const FEWEST_ROWS: usize = 10;
 
@@ -55,14 +50,17 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// A run whose angle is late by this much, s: its reference is taken as long before.
-    fn new(run: &SensorRun, number: usize, sensor: &Sensor, late_s: f64) -> Option<Self> {
+    fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
         let Reading::Angle(theta) = &run.reading else { return None };
-        let reference = delayed(&run.t_s, &run.reference_rad, late_s);
-        let raw: Vec<f64> = theta.iter().zip(&reference).map(|(t, a)| t - sensor.gain * a).collect();
+        let raw: Vec<f64> = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - sensor.gain * a).collect();
         let error = centred(&raw, sensor.period);
-        let rate = delayed(&run.t_s, &run.rate_rad_s, late_s);
-        Some(Self { run: number, t: run.t_s.clone(), reference, rate, error })
+        Some(Self {
+            run: number,
+            t: run.t_s.clone(),
+            reference: run.reference_rad.clone(),
+            rate: run.rate_rad_s.clone(),
+            error,
+        })
     }
 
     fn part(&self, rows: std::ops::Range<usize>) -> Self {
@@ -95,21 +93,6 @@ impl Stretch {
             .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
             .collect()
     }
-}
-
-/// A series as it was `by_s` earlier, by straight lines, and at its ends by the first and the last of them.
-fn delayed(t: &[f64], values: &[f64], by_s: f64) -> Vec<f64> {
-    if by_s == 0.0 || t.len() < 2 {
-        return values.to_vec();
-    }
-    t.iter()
-        .map(|t_s| {
-            let at = t_s - by_s;
-            let i = t.partition_point(|t| *t <= at).clamp(1, t.len() - 1);
-            let part = (at - t[i - 1]) / (t[i] - t[i - 1]).max(f64::MIN_POSITIVE);
-            values[i - 1] + part * (values[i] - values[i - 1])
-        })
-        .collect()
 }
 
 fn variance(values: &[f64]) -> f64 {
@@ -179,10 +162,6 @@ pub(crate) struct RateGyroscope {
     pub(crate) answered: bool,
     /// terms with their values and standard deviations by the jackknife over parts
     pub(crate) terms: Vec<(Term, f64, f64)>,
-    /// how late its angle is taken to be while the rest is fitted, s
-    pub(crate) late_s: f64,
-    /// there is no lag among the terms, or it is larger than what is known of it
-    lag_told: bool,
     /// the bias does not repeat from run to run: it is taken to be zero elsewhere
     pub(crate) bias_varies: bool,
     /// geometric mean of the left-out rms, rad, with the terms and without
@@ -190,11 +169,6 @@ pub(crate) struct RateGyroscope {
     pub(crate) predicted_raw: f64,
     /// k and its standard deviation, from all terms together; `None` where a scale factor is not told from a bias
     pub(crate) gain: (f64, Option<f64>),
-}
-
-/// The runs, each late by this much, s; none where one has no angle.
-fn stretches(sensor: &Sensor, runs: &[SensorRun], late_s: f64) -> Option<Vec<Stretch>> {
-    runs.iter().enumerate().map(|(i, r)| Stretch::new(r, i, sensor, late_s)).collect()
 }
 
 /// A left-out part and what is fitted without it.
@@ -222,60 +196,33 @@ impl RateGyroscope {
     /// Identifies bias, scale factor and lag; `None` where a run has no angle or all of them too few rows.
     pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Option<Self> {
         let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs).ok()?;
-        let all = stretches(&sensor, runs, 0.0)?;
-        if splits(&all).len() < 2 {
+        let all: Vec<Stretch> =
+            runs.iter().enumerate().map(|(i, r)| Stretch::new(r, i, &sensor)).collect::<Option<_>>()?;
+        let splits = splits(&all);
+        if splits.len() < 2 {
             return None;
         }
         let terms = told(&all, &Folds::interleaved(runs));
-        let found = Self::fitted(sensor, runs, &terms)?;
-        if found.lag_told {
-            return Some(found);
-        }
-        // it helped by less than what is known of it
-        Self::fitted(sensor, runs, &terms.into_iter().filter(|t| *t != Term::Lag).collect::<Vec<_>>())
-    }
-
-    fn fitted(sensor: Sensor, runs: &[SensorRun], terms: &[Term]) -> Option<Self> {
-        let mut all = stretches(&sensor, runs, 0.0)?;
-        let log_variance = |left: &[f64]| variance(left).ln();
-        let raw: Vec<f64> = splits(&all).iter().map(|s| log_variance(&s.test.error)).collect();
-        // a lag is no matter of the rate alone: what it leaves goes with the acceleration, as a scale factor does
-        let mut late_s = 0.0;
-        if let Some(lag) = terms.iter().position(|t| *t == Term::Lag) {
-            for _ in 0..ROUNDS {
-                late_s -= estimate(&all, terms)[lag] / sensor.gain;
-                all = stretches(&sensor, runs, late_s)?;
-            }
-        }
-        let splits = splits(&all);
-        let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, terms)).collect();
-        let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(&s.test.left(terms, v))).collect();
+        let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &terms)).collect();
+        let log_variance = |left: Vec<f64>| variance(&left).ln();
+        let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(s.test.left(&terms, v))).collect();
+        let raw: Vec<f64> = splits.iter().map(|s| log_variance(s.test.error.clone())).collect();
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let gained: Vec<f64> = loss.iter().zip(&raw).map(|(a, b)| a - b).collect();
         let n = gained.len() as f64;
         let scatter = gained.iter().map(|g| (g - mean(&gained)).powi(2)).sum::<f64>() / (n - 1.0);
         let answered = mean(&gained) < HARMS * (scatter / n).sqrt();
-        let mut values = estimate(&all, terms);
-        let bias_varies = forget_a_bias_that_varies(&all, terms, &mut values);
+        let mut values = estimate(&all, &terms);
+        let bias_varies = forget_a_bias_that_varies(&all, &terms, &mut values);
         let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
         let every_fit: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &every)).collect();
         let tells_scale = terms.iter().position(|t| *t == Term::Scale);
         let scale = tells_scale.filter(|_| answered).map_or(0.0, |i| values[i]);
-        let gone = |term: Term| if term == Term::Lag { -(sensor.gain + scale) * late_s } else { 0.0 };
-        // one part left out may leave nothing that tells a lag
-        let lag_told = terms.iter().position(|t| *t == Term::Lag).is_none_or(|at| {
-            let of: Vec<f64> = fits.iter().map(|f| f[at]).collect();
-            let middle = median(&mut of.clone());
-            let usual = robust_deviation(of.iter().map(|v| v - middle)) * (of.len() as f64 - 1.0).sqrt();
-            (values[at] + gone(Term::Lag)).abs() > TOLD * usual
-        });
         Some(Self {
             sensor,
             answered,
-            lag_told,
-            terms: terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v + gone(*t), d)).collect(),
-            late_s: if answered { late_s } else { 0.0 },
+            terms: terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v, d)).collect(),
             bias_varies,
             predicted: (0.5 * mean(&loss)).exp(),
             predicted_raw: (0.5 * mean(&raw)).exp(),
@@ -291,9 +238,9 @@ impl RateGyroscope {
 
     /// Error of a run with the terms taken out.
     pub(crate) fn left(&self, run: &SensorRun) -> Vec<f64> {
-        let Some(stretch) = Stretch::new(run, 0, &self.sensor, self.late_s) else { return Vec::new() };
-        let rest = self.value(Term::Lag) + self.gain.0 * self.late_s;
-        stretch.left(&[Term::Bias, Term::Scale, Term::Lag], &[self.value(Term::Bias), self.value(Term::Scale), rest])
+        let Some(stretch) = Stretch::new(run, 0, &self.sensor) else { return Vec::new() };
+        let every = [Term::Bias, Term::Scale, Term::Lag];
+        stretch.left(&every, &every.map(|t| self.value(t)))
     }
 }
 

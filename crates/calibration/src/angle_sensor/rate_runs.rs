@@ -137,14 +137,9 @@ fn end_of_range(run: &SensorRun, period: f64) -> Option<String> {
 }
 
 /// Says where in a run the angle and its reference part by most of what is `left`, where that is a short part of it; or that
-/// they do all along, by more than noise of the rate makes. The reference was taken `late_s` earlier, which it does not tell
-/// at one end of the run.
-pub(super) fn parting(run: &SensorRun, left: &[f64], late_s: f64) -> Option<String> {
-    let (first, last) = (run.t_s.first()?, run.t_s.last()?);
-    let begin = run.t_s.partition_point(|t| t - late_s < *first);
-    let end = run.t_s.partition_point(|t| t - late_s <= *last);
-    let (left, t_s) = (left.get(begin..end)?, &run.t_s[begin..end]);
-    let n = left.len();
+/// they do all along, by more than noise of the rate makes.
+pub(super) fn parting(run: &SensorRun, left: &[f64]) -> Option<String> {
+    let (n, t_s) = (left.len(), &run.t_s);
     let steps: Vec<f64> = left.windows(2).map(|w| w[1] - w[0]).collect();
     let all = span(left);
     let usual = robust_deviation(steps.iter().copied());
@@ -258,12 +253,12 @@ mod tests {
                 Some(*sum)
             })
             .collect();
-        assert_eq!(parting(&run, &walk, 0.0), None);
+        assert_eq!(parting(&run, &walk), None);
         let slipped: Vec<f64> =
             walk.iter().enumerate().map(|(i, w)| w + 0.05 * ((i as f64 - 3000.0) / 30.0).clamp(0.0, 1.0)).collect();
-        let said = parting(&run, &slipped, 0.0).expect("thirty rows");
+        let said = parting(&run, &slipped).expect("thirty rows");
         let drifts: Vec<f64> = walk.iter().enumerate().map(|(i, w)| w + 1e-8 * (i as f64).powi(2)).collect();
-        let slowly = parting(&run, &drifts, 0.0).expect("a rate that changes");
+        let slowly = parting(&run, &drifts).expect("a rate that changes");
         assert!(slowly.contains("in the course of the run"), "{slowly}");
         assert!(said.starts_with("a: from 30.00 s to 30.32 s") || said.starts_with("a: from 29.9"), "{said}");
     }

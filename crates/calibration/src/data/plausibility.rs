@@ -219,15 +219,17 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Takes an energy command that never changes for one that was not recorded, and says so: noise alone moves what holds an
-/// amplitude.
-pub(crate) fn without_dead_command(recording: &mut Recording, warnings: &mut Vec<String>) -> bool {
+/// Takes an energy command that never changes before `off_s`, when its loop is switched off, for one that was not recorded, and
+/// says so: noise alone moves what holds an amplitude.
+pub(crate) fn without_dead_command(recording: &mut Recording, off_s: f64, warnings: &mut Vec<String>) -> bool {
+    let on = recording.t_s.partition_point(|t| *t < off_s);
     let never_changes = |v: &[f64]| v.windows(2).all(|v| v[0] == v[1]);
-    let is_dead = recording.vas_v.as_deref().is_some_and(|v| v.len() >= FEWEST_COMMANDS && never_changes(v));
+    let v_as = recording.vas_v.as_deref().and_then(|v| v.get(..on));
+    let is_dead = v_as.is_some_and(|v| v.len() >= FEWEST_COMMANDS && never_changes(v));
     if is_dead {
         let v_as = recording.vas_v.take().and_then(|v| v.first().copied()).unwrap_or_default();
         warnings.push(format!(
-            "{}: vas_v is {v_as} in every row: no loop gives that, and it counts as not recorded",
+            "{}: vas_v is {v_as} in every row with the loop on: no loop gives that, and it counts as not recorded",
             recording.source.display()
         ));
     }
@@ -440,12 +442,12 @@ pub(super) mod tests {
             let (mut r, mut warnings) = (recorded(), Vec::new());
             let rows = r.t_s.len();
             r.vas_v = Some(vec![v_as; rows]);
-            assert!(without_dead_command(&mut r, &mut warnings) && r.vas_v.is_none());
+            assert!(without_dead_command(&mut r, f64::INFINITY, &mut warnings) && r.vas_v.is_none());
             assert!(warnings[0].contains("vas_v is") && warnings[0].contains("not recorded"), "{warnings:?}");
             let mut moving = vec![v_as; rows];
             moving[rows / 2] += 1e-9;
             r.vas_v = Some(moving);
-            assert!(!without_dead_command(&mut r, &mut warnings) && r.vas_v.is_some());
+            assert!(!without_dead_command(&mut r, f64::INFINITY, &mut warnings) && r.vas_v.is_some());
         }
     }
 

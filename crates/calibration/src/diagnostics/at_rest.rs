@@ -344,7 +344,7 @@ fn summed(t_s: &[f64], integral: &[f64]) -> Vec<f64> {
         let mean = (angle[1] - angle[0]) / (t[1] - t[0]);
         rates.push(2.0 * mean - rates[rates.len() - 1]);
     }
-    let sign = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
     let alternates = rates.iter().enumerate().map(|(i, r)| sign(i) * r).sum::<f64>() / rates.len() as f64;
     let mut angle = integral.first().copied().unwrap_or(0.0);
     let mut out = vec![angle];

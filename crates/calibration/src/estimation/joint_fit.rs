@@ -84,13 +84,15 @@ impl Dataset {
             warnings.extend(r.recording.warnings.iter().cloned());
         }
         for run in &mut rotations {
-            without_dead_command(&mut run.recording, &mut warnings);
+            without_dead_command(&mut run.recording, f64::INFINITY, &mut warnings);
             without_held_commands(&mut run.recording, &mut warnings);
         }
         // a ring-down tells nothing without its command
         let (mut ring_down_runs, mut ring_downs_left_out) = (Vec::new(), Vec::new());
         for mut run in ring_downs {
-            if without_dead_command(&mut run.recording, &mut warnings) {
+            let off_s =
+                if let RunKind::Ringdown { energy_off_s, .. } = run.kind { energy_off_s } else { f64::INFINITY };
+            if without_dead_command(&mut run.recording, off_s, &mut warnings) {
                 ring_downs_left_out.push(run.file.display().to_string());
             } else {
                 ring_down_runs.push(run);

@@ -887,7 +887,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a turn is its sine",
         "calibrator/src/window.rs",
-        "self.angle = self.angle + x + x * x * x * T::ratio(1, 6);",
+        "self.angle = self.angle + x + x * x2 * (T::ratio(1, 6) + x2 * T::ratio(3, 40));",
         "self.angle = self.angle + x;",
         CALIBRATOR,
     ),
@@ -901,8 +901,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision the mean angle is the first",
         "calibrator/src/window.rs",
-        "self.first.1.atan2(self.first.0) + self.turned / self.count",
-        "self.first.1.atan2(self.first.0) + if core::mem::size_of::<T>() == 4 { T::zero() } else { self.turned / self.count }",
+        "let mean = self.turned / self.count;",
+        "let mean = if core::mem::size_of::<T>() == 4 { T::zero() } else { self.turned / self.count };",
         CALIBRATOR,
     ),
     fault(
@@ -945,13 +945,6 @@ pub(super) const FAULTS: &[Fault] = &[
         "calibrator/src/cycle.rs",
         "if s.schedule.fresh > 5 {",
         "if s.schedule.fresh > 0 {",
-        CALIBRATOR,
-    ),
-    fault(
-        "the floor of a stage is that of the next",
-        "calibrator/src/cycle.rs",
-        "FLOOR.get(usize::from(s.schedule.stage))",
-        "FLOOR.get(usize::from(s.schedule.stage) + 1)",
         CALIBRATOR,
     ),
     fault(
@@ -999,8 +992,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what was used before a turn counts",
         "calibrator/src/cycle.rs",
-        "                    s.filter.forget_others(T::one());\n                    sc.used = 0;",
-        "                    s.filter.forget_others(T::one());",
+        "                    sc.forget(OTHERS, T::one());\n                    sc.used = 0;",
+        "                    sc.forget(OTHERS, T::one());",
         CALIBRATOR,
     ),
     fault(
@@ -1039,24 +1032,10 @@ pub(super) const FAULTS: &[Fault] = &[
         CALIBRATOR,
     ),
     fault(
-        "two turns in one sense are unwrapped once",
-        "calibrator/src/cycle.rs",
-        "        x + T::two() * T::PI\n",
-        "        x + T::PI\n",
-        CALIBRATOR,
-    ),
-    fault(
-        "four columns are not projected",
-        "calibrator/src/commit.rs",
-        "1..=5 if s.schedule.accept",
-        "1..=4 if s.schedule.accept",
-        CALIBRATOR,
-    ),
-    fault(
         "a symmetry is used before anything is tracked",
         "calibrator/src/commit.rs",
-        "s.schedule.accept = s.schedule.stage >= 4 && seen &&",
-        "s.schedule.accept = s.schedule.stage >= 3 && seen &&",
+        "s.schedule.stage >= 4 && seen && phase",
+        "s.schedule.stage >= 3 && seen && phase",
         CALIBRATOR,
     ),
     fault(
@@ -1090,22 +1069,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what no instrument is leaves its mean",
         "calibrator/src/commit.rs",
-        "            s.filter.mean = [T::zero(); N];\n            self.split_changed(s);",
-        "            self.split_changed(s);",
-        CALIBRATOR,
-    ),
-    fault(
-        "what no instrument is leaves its mechanics",
-        "calibrator/src/commit.rs",
-        "            self.split_changed(s);\n            return;\n        };\n        s.correction",
-        "            return;\n        };\n        s.correction",
+        "        s.schedule.forget(N, T::one());",
+        "        s.schedule.forget(OTHERS, T::one());",
         CALIBRATOR,
     ),
     fault(
         "the last stage forgets as the first",
         "calibrator/src/commit.rs",
-        "        if sc.stage < 3 {",
-        "        if sc.stage <= 3 {",
+        "0..3 if forth =>",
+        "0..=3 if forth =>",
         CALIBRATOR,
     ),
     fault(
@@ -1300,15 +1272,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision a measurement correlates with the wrong sign",
         "calibrator/src/ud.rs",
-        "let lambda = -(f * update.inverse);",
-        "let lambda = if core::mem::size_of::<T>() == 4 { f * update.inverse } else { -(f * update.inverse) };",
+        "update.lambda = -(f * update.inverse);",
+        "update.lambda = if core::mem::size_of::<T>() == 4 { f * update.inverse } else { -(f * update.inverse) };",
         CALIBRATOR,
     ),
     fault(
         "the shortest cycle is refused",
         "calibrator/src/lib.rs",
-        "if s.steps < cycle::SLICES {",
-        "if s.steps <= cycle::SLICES {",
+        "if s.steps < cycle::SLICES / 2 {",
+        "if s.steps <= cycle::SLICES / 2 {",
         CALIBRATOR,
     ),
     fault(
@@ -1323,13 +1295,6 @@ pub(super) const FAULTS: &[Fault] = &[
         "calibrator/src/lib.rs",
         "        state.score = T::zero();\n        state.before.whole = false;\n",
         "        state.score = T::zero();\n",
-        CALIBRATOR,
-    ),
-    fault(
-        "a split that changed leaves the commit going",
-        "calibrator/src/lib.rs",
-        "        sc.commit = state::Commit::None;\n",
-        "",
         CALIBRATOR,
     ),
     fault("the phase is that of volts", "calibrator/src/lib.rs", "l: p.l * k }", "l: p.l }", CALIBRATOR),
@@ -1884,8 +1849,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a scale of the forces wanders no faster than a phase",
         "calibrator/src/parameters.rs",
-        "P::ForceScale => 1e-5,",
-        "P::ForceScale => 1e-6,",
+        "P::ForceScale => c(1e-5),",
+        "P::ForceScale => c(1e-6),",
         CALIBRATOR,
     ),
     fault(
@@ -1926,8 +1891,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "seconds are rounded up to cycles",
         "calibrator/src/lib.rs",
-        "(f64::from(seconds) * per_second) as u16",
-        "(f64::from(seconds) * per_second) as u16 + 1",
+        ">> 16) as u16;",
+        ">> 16) as u16 + 1;",
         CALIBRATOR,
     ),
     fault(
@@ -2036,17 +2001,10 @@ pub(super) const FAULTS: &[Fault] = &[
         CALIBRATOR,
     ),
     fault(
-        "in single precision a turn is not the shorter way",
-        "calibrator/src/cycle.rs",
-        "    if x > T::PI {",
-        "    if core::mem::size_of::<T>() == 4 {\n        x\n    } else if x > T::PI {",
-        CALIBRATOR,
-    ),
-    fault(
         "in single precision what is committed stays in the mean",
         "calibrator/src/commit.rs",
-        "            *mean = *mean - *delta / p.expected::<T>();\n        }\n        let sc",
-        "            *mean = *mean - if core::mem::size_of::<T>() == 4 { T::zero() } else { *delta / p.expected::<T>() };\n        }\n        let sc",
+        "            let moved = *delta / p.expected::<T>();",
+        "            let moved = if core::mem::size_of::<T>() == 4 { T::zero() } else { *delta / p.expected::<T>() };",
         CALIBRATOR,
     ),
     fault(
