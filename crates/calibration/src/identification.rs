@@ -272,6 +272,7 @@ impl Found {
         let actuation_gain_ratio = inference.actuation_ratio(detection_gain_ratio, &mut warnings);
         let mut effects = inference.effects(&self.steps, &errors.discovered);
         effects.extend(self.drives.clone());
+        warnings.extend(self.drives.as_ref().map(|_| CLIPPED_DRIVES.to_owned()));
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);
         let plots = with_plots.then(|| {
@@ -449,6 +450,10 @@ fn left_over(heldout: &Heldout) -> Option<String> {
         )
     })
 }
+
+/// What drives that clip mean for the rest.
+const CLIPPED_DRIVES: &str = "the drives clip: angular gain and actuation gain ratio are fitted as if they gave what they were \
+                              told, which their intervals do not allow for; a recording at a smaller amplitude would tell";
 
 /// Says what an effect cannot be told from, and what would.
 fn confounded(e: &EffectReport) -> String {

@@ -130,7 +130,7 @@ fn committed<T: Float>(stage: u8, moving: u16, back: bool) -> Shown {
     let ways = if back { &[Commit::Forth, Commit::Back][..] } else { &[Commit::Forth] };
     for way in ways {
         s.schedule.commit = *way;
-        for k in 0..=40 {
+        for k in 0..80 {
             s.step = k;
             c.work(&mut s);
         }
