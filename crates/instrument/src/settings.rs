@@ -140,6 +140,33 @@ impl Settings<'_> {
         self.drive_per_s_v * Real::sin_cos(x).0 / x
     }
 
+    /// Each value by itself is one that there can be.
+    fn require_domain(&self) -> Result<(), ConfigError> {
+        let positive = [
+            (self.carrier_hz, "carrier_hz"),
+            (self.sample_hz, "sample_hz"),
+            (self.adc_full_scale_v, "adc_full_scale_v"),
+            (self.dac_limit_v, "dac_limit_v"),
+            (self.amplitude_v, "amplitude_v"),
+            (self.drive_per_s_v, "drive_per_s_v"),
+        ];
+        for (value, parameter) in positive {
+            if !(value > 1e-9 && value < 1e9) {
+                return Err(ConfigError { parameter, expected: "between 1e-9 and 1e9" });
+            }
+        }
+        if self.amplitude_v > 0.9 * self.adc_full_scale_v {
+            return Err(ConfigError { parameter: "amplitude_v", expected: "at most 0.9 of adc_full_scale_v" });
+        }
+        let period_s = 1.0 / self.sample_hz;
+        for (value, parameter) in [(self.readout_delay_s, "readout_delay_s"), (self.drive_delay_s, "drive_delay_s")] {
+            if !(value >= 0.0 && value <= 10.0 * period_s) {
+                return Err(ConfigError { parameter, expected: "not negative and at most ten samples" });
+            }
+        }
+        Ok(())
+    }
+
     fn supervisor(&self) -> SupervisorSettings {
         SupervisorSettings {
             window_s: self.window_s(),
@@ -166,28 +193,8 @@ impl<T: Float> Instrument<T> {
     /// # Errors
     /// The first parameter that is outside its domain, or that the others make impossible.
     pub fn new(s: &Settings<'_>) -> Result<Self, ConfigError> {
-        let positive = [
-            (s.carrier_hz, "carrier_hz"),
-            (s.sample_hz, "sample_hz"),
-            (s.adc_full_scale_v, "adc_full_scale_v"),
-            (s.dac_limit_v, "dac_limit_v"),
-            (s.amplitude_v, "amplitude_v"),
-            (s.drive_per_s_v, "drive_per_s_v"),
-        ];
-        for (value, parameter) in positive {
-            if !(value > 1e-9 && value < 1e9) {
-                return Err(ConfigError { parameter, expected: "between 1e-9 and 1e9" });
-            }
-        }
-        if s.amplitude_v > 0.9 * s.adc_full_scale_v {
-            return Err(ConfigError { parameter: "amplitude_v", expected: "at most 0.9 of adc_full_scale_v" });
-        }
+        s.require_domain()?;
         let period_s = 1.0 / s.sample_hz;
-        for (value, parameter) in [(s.readout_delay_s, "readout_delay_s"), (s.drive_delay_s, "drive_delay_s")] {
-            if !(value >= 0.0 && value <= 10.0 * period_s) {
-                return Err(ConfigError { parameter, expected: "not negative and at most ten samples" });
-            }
-        }
         let demodulator = Demodulator::new(s.window, s.adc_full_scale_v)?;
         let window_s = s.window_s();
         let omega = TAU * s.carrier_hz;

@@ -78,6 +78,16 @@ impl Head {
             warnings: campaign.runs.iter().flat_map(|r| r.recording.warnings.iter().cloned()).collect(),
         }
     }
+
+    fn calibration(self, hypothesis: Hypothesis) -> Calibration {
+        let provenance = Provenance {
+            tool: Some(Tool::default()),
+            inputs: self.inputs,
+            amplitude_v: self.amplitude_v,
+            readout_unit: self.readout_unit,
+        };
+        Calibration { device: self.device, hypothesis, provenance }
+    }
 }
 
 /// Points of one curve.
@@ -87,6 +97,67 @@ const DENSE_STEP: f64 = 0.035;
 const SAME_STATION: f64 = 1e-3;
 /// Pairs of repeated stations that a noise floor needs.
 const FEWEST_PAIRS: usize = 10;
+
+/// The errors of every stage on the held-out rows, and of what is undone on the fitted ones.
+struct Evaluated {
+    raw: Option<Evaluation>,
+    declared: Evaluation,
+    discovered: Evaluation,
+    on_fit: Evaluation,
+    /// why nothing is undone, where nothing is: every stage is the raw one then
+    reason: Option<String>,
+}
+
+impl Evaluated {
+    fn of(finding: &Finding<'_>, fitted: &[SensorRun], held: &[SensorRun]) -> Self {
+        let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
+            let segments = runs.iter().map(|r| segment(r, errors(r), finding)).collect();
+            Evaluation::of_segments(segments, like)
+        };
+        let mut discovered = evaluate(&finding.discovered, held, None);
+        let raw = finding.raw.as_ref().map(|raw| evaluate(raw, held, Some(&discovered)));
+        let mut declared = evaluate(&finding.declared, held, Some(&discovered));
+        let reason = finding.reason.clone().or_else(|| {
+            let [left, nothing] = [discovered.size(), raw.as_ref()?.size()].map(|size| size.rms_deg);
+            (left > nothing).then(|| {
+                format!(
+                    "what was found does not help on held-out data: it leaves {left:.4}°, and nothing undone leaves \
+                     {nothing:.4}°"
+                )
+            })
+        });
+        let neutral = reason.is_some();
+        if neutral && let Some(raw) = &raw {
+            (discovered, declared) = (raw.clone(), raw.clone());
+        }
+        let undone = finding.raw.as_ref().filter(|_| neutral).unwrap_or(&finding.discovered);
+        Self { on_fit: evaluate(undone, fitted, None), raw, declared, discovered, reason }
+    }
+
+    fn heldout(&self, held: &[SensorRun]) -> Heldout {
+        Heldout {
+            raw: self.raw.as_ref().map(Evaluation::size),
+            declared: self.declared.size(),
+            discovered: self.discovered.size(),
+            noise_floor_deg: noise_floor(&self.discovered, held).to_degrees(),
+        }
+    }
+
+    fn residual(&self) -> ResidualReport {
+        let correlation = autocorrelation(&self.on_fit, WHITENESS_LAGS);
+        let harmonics = |of| reported_harmonics(&self.discovered, of, &self.discovered);
+        ResidualReport {
+            harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
+            white: ljung_box(&correlation, self.on_fit.errors().count()) >= WHITENESS_LEVEL,
+        }
+    }
+
+    /// Samples that are set aside as spikes, in any of these runs.
+    fn spikes(&self, runs: impl Iterator<Item = usize>) -> usize {
+        let numbers: std::collections::BTreeSet<usize> = runs.collect();
+        numbers.iter().map(|&n| self.on_fit.spikes_of(n) + self.discovered.spikes_of(n)).sum()
+    }
+}
 
 /// Reads the held-out rows, once, and reports.
 ///
@@ -99,56 +170,30 @@ pub(crate) fn report(
     held: &[SensorRun],
     with_plots: bool,
 ) -> Result<Identification, Refusal> {
-    let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
-        let segments = runs.iter().map(|r| segment(r, errors(r), &finding)).collect();
-        Evaluation::of_segments(segments, like)
-    };
-    let mut after = evaluate(&finding.discovered, held, None);
-    let raw = finding.raw.as_ref().map(|raw| evaluate(raw, held, Some(&after)));
-    let mut declared = evaluate(&finding.declared, held, Some(&after));
-    let mut reason = finding.reason.clone();
-    let worse = |e: &Evaluation| raw.as_ref().is_some_and(|raw| e.size().rms_deg > raw.size().rms_deg);
-    if reason.is_none() && worse(&after) {
-        let sizes = [Some(&after), raw.as_ref()].map(|e| e.map_or(f64::NAN, |e| e.size().rms_deg));
-        reason = Some(format!(
-            "what was found does not help on held-out data: it leaves {:.4}°, and nothing undone leaves {:.4}°",
-            sizes[0], sizes[1]
-        ));
-    }
-    let neutral = reason.is_some();
-    if neutral && let Some(raw) = &raw {
-        (after, declared) = (raw.clone(), raw.clone());
-    }
-    let on_fit = evaluate(
-        if neutral { finding.raw.as_ref().unwrap_or(&finding.discovered) } else { &finding.discovered },
-        fitted,
-        None,
-    );
-    let correlation = autocorrelation(&on_fit, WHITENESS_LAGS);
-    let white = ljung_box(&correlation, on_fit.errors().count()) >= WHITENESS_LEVEL;
-    let floor = noise_floor(&after, held);
+    let errors = Evaluated::of(&finding, fitted, held);
+    let Evaluated { raw, declared, discovered, .. } = &errors;
+    let neutral = errors.reason.is_some();
     let mut effects = if neutral { Vec::new() } else { finding.effects.clone() };
     provenance::in_unit(&mut effects, head.readout_unit.as_deref());
     for e in effects.iter_mut().filter(|e| e.origin != Origin::Declared) {
         e.heldout_rms_deg =
-            Some(crate::report::BeforeAfter { before: declared.size().rms_deg, after: after.size().rms_deg });
+            Some(crate::report::BeforeAfter { before: declared.size().rms_deg, after: discovered.size().rms_deg });
     }
     let mut warnings = head.warnings.clone();
     warnings.extend(finding.warnings.iter().cloned());
-    let numbers: std::collections::BTreeSet<usize> = fitted.iter().chain(held).map(|r| r.number).collect();
-    let spikes: usize = numbers.iter().map(|&n| on_fit.spikes_of(n) + after.spikes_of(n)).sum();
+    let spikes = errors.spikes(fitted.iter().chain(held).map(|r| r.number));
     if spikes > 0 {
         warnings.push(format!("{spikes} samples were set aside as spikes"));
     }
-    let mut steps = stages(raw.as_ref(), &declared, &after, &[]);
-    steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, &after)));
+    let mut steps = stages(raw.as_ref(), declared, discovered, &[]);
+    steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, discovered)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
-    let plots = with_plots.then(|| plots(&names, raw.as_ref(), &declared, &after, &finding));
-    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&on_fit, &after]);
+    let plots = with_plots.then(|| plots(&names, raw.as_ref(), declared, discovered, &finding));
+    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered]);
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
-        reason,
+        reason: errors.reason.clone(),
         tool: Tool::default(),
         inputs: head.inputs.clone(),
         device: head.device.clone(),
@@ -158,20 +203,9 @@ pub(crate) fn report(
         actuation_gain_ratio: None,
         unexplained: described(&effects, finding.hypothesis.angular_gain.abs()),
         effects,
-        heldout: Heldout {
-            raw: raw.as_ref().map(Evaluation::size),
-            declared: declared.size(),
-            discovered: after.size(),
-            noise_floor_deg: floor.to_degrees(),
-        },
+        heldout: errors.heldout(held),
         steps,
-        residual: ResidualReport {
-            harmonics: [Follows::Pattern, Follows::Table]
-                .into_iter()
-                .flat_map(|of| reported_harmonics(&after, of, &after))
-                .collect(),
-            white,
-        },
+        residual: errors.residual(),
         channels: Vec::new(),
         runs: reported,
         decomposition: finding.decomposition.clone(),
@@ -183,28 +217,22 @@ pub(crate) fn report(
         warnings,
     };
     let figures = Figures {
-        bias: curves(held, raw.as_ref(), &declared, &after, finding.period),
+        bias: curves(held, raw.as_ref(), declared, discovered, finding.period),
         ring_downs: Vec::new(),
         channels: finding.readout.filter(|_| with_plots).map(|readout| Curve::new(&readout, held)),
     };
-    let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
-    let provenance = Provenance {
-        tool: Some(Tool::default()),
-        inputs: head.inputs,
-        amplitude_v: head.amplitude_v,
-        readout_unit: head.readout_unit,
+    let facts = Facts {
+        instrument: finding.instrument,
+        period_deg: finding.period.to_degrees(),
+        // what hardly turns has a bias, and a gain that nobody can judge
+        tells_gain: gate::gain_is_told(&report.angular_gain) || fitted.iter().any(turns),
+        stated: finding.stated_gain,
+        held_out: discovered.errors().count(),
+        fitted_rms_deg: errors.on_fit.size().rms_deg,
     };
-    let calibration = Calibration { device: head.device, hypothesis, provenance };
+    let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
+    let calibration = head.calibration(hypothesis);
     if !neutral {
-        let facts = Facts {
-            instrument: finding.instrument,
-            period_deg: finding.period.to_degrees(),
-            // what hardly turns has a bias, and a gain that nobody can judge
-            tells_gain: gate::gain_is_told(&report.angular_gain) || fitted.iter().any(turns),
-            stated: finding.stated_gain,
-            held_out: after.errors().count(),
-            fitted_rms_deg: on_fit.size().rms_deg,
-        };
         gate::pass(&report, &calibration, facts)?;
     }
     Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })

@@ -27,8 +27,11 @@ pub(crate) struct Track {
     pub(crate) input_rad: Vec<f64>,
     /// stretches without a gap, and what each is for
     pub(crate) segments: Vec<Segment>,
-    /// every how many samples a fit looks at: more than one only in runs of more than [`ENOUGH_SAMPLES`]
+    /// every how many samples a first look takes: more than one only in runs of more than [`ENOUGH_SAMPLES`], until they are
+    /// thinned
     pub(crate) stride: usize,
+    /// of a thinned run, the beginnings of its segments with every sample
+    dense: Option<Box<Track>>,
     source: Source,
     commands: Option<[Vec<f64>; 2]>,
     /// temperature, °C, and over the one that parameters refer to, K
@@ -61,10 +64,15 @@ const GAP_INTERVALS: f64 = 20.0;
 /// Share of a run, in time, that is held out where no run is: the last quarter.
 const FITTED_SHARE: f64 = 0.75;
 /// Samples of one run beyond which more would not narrow an interval that still means something; longer runs are
-/// looked at evenly thinned, as far as the pattern turns little from sample to sample.
+/// evenly thinned, as far as the pattern turns little from sample to sample.
 const ENOUGH_SAMPLES: usize = 100_000;
-/// Largest turn of the table between the samples of a thinned run, rad.
-const LARGEST_THINNED_TURN: f64 = 0.15;
+/// Samples at the beginning of each segment of a thinned run that are kept all: they tell its noise.
+pub(crate) const DENSE_SAMPLES: usize = 1 << 16;
+/// Largest turn of the table between the samples of a first look, rad.
+const LARGEST_FIRST_TURN: f64 = 0.15;
+/// Largest turn of the pattern between samples of a thinned track, rad: what a command that repeats with it does to the
+/// pattern stays good to 1e-5 of it.
+pub(crate) const LARGEST_TURN: f64 = 0.2;
 /// A run whose mean rate is more than this share of its mean speed turns one way.
 pub(crate) const ONE_WAY: f64 = 0.9;
 /// A segment needs this many samples to carry a bias of its own.
@@ -90,11 +98,82 @@ impl Track {
         if track.segments.is_empty() {
             return Err(Refusal::new(&name, "too few samples are left after settling", "a longer run"));
         }
-        let turn = track.mean_speed() * (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / track.t_s.len() as f64;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
-        let resolved = (LARGEST_THINNED_TURN / turn.max(1e-12)) as usize;
+        let resolved = track.resolved(LARGEST_FIRST_TURN, track.mean_speed());
         track.stride = (track.t_s.len() / ENOUGH_SAMPLES).min(resolved).max(1);
         Ok(track)
+    }
+
+    /// The number of sampling intervals in which what turns at `speed_rad_s` turns by `turn_rad`, at least one.
+    pub(crate) fn resolved(&self, turn_rad: f64, speed_rad_s: f64) -> usize {
+        let interval = (self.t_s[self.t_s.len() - 1] - self.t_s[0]) / (self.t_s.len().max(2) - 1) as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
+        let count = (turn_rad / (speed_rad_s * interval).abs().max(1e-12)) as usize;
+        count.max(1)
+    }
+
+    /// Thins a run of more samples than are needed, while its pattern precesses at `speed_rad_s`: each command becomes what
+    /// stands for the samples around it. Of the beginnings of its segments every sample is kept besides.
+    pub(crate) fn thin(&mut self, speed_rad_s: f64) {
+        let width = (self.t_s.len() / ENOUGH_SAMPLES).min(self.resolved(LARGEST_TURN, speed_rad_s));
+        self.stride = 1;
+        if width > 1 {
+            let thinned = self.every(width, 0);
+            *self = Self { dense: Some(Box::new(self.every(width, DENSE_SAMPLES))), ..thinned };
+        }
+    }
+
+    /// Every sample of the first `dense` of each segment, which are its segment then, and every `width`th of the rest; where
+    /// `dense` is zero a segment is what is left of it.
+    fn every(&self, width: usize, dense: usize) -> Self {
+        let (mut rows, mut segments, mut at) = (Vec::new(), Vec::new(), 0);
+        for segment in &self.segments {
+            rows.extend((at..segment.range.start).step_by(width));
+            let start = rows.len();
+            at = segment.range.end.min(segment.range.start + dense);
+            rows.extend(segment.range.start..at);
+            if dense == 0 {
+                rows.extend(segment.range.clone().step_by(width));
+                at = segment.range.end;
+            }
+            segments.push(Segment { range: start..rows.len(), role: segment.role });
+        }
+        rows.extend((at..self.t_s.len()).step_by(width));
+        let of =
+            |v: &[f64]| -> Vec<f64> { if v.is_empty() { Vec::new() } else { rows.iter().map(|&i| v[i]).collect() } };
+        let both = |v: &[Vec<f64>; 2]| [of(&v[0]), of(&v[1])];
+        let width = if dense == 0 { width } else { 1 };
+        let command = |v: &[f64]| -> Vec<f64> { rows.iter().map(|&i| thinned(v, i, width)).collect() };
+        Self {
+            name: self.name.clone(),
+            file: self.file.clone(),
+            t_s: of(&self.t_s),
+            input_rad: of(&self.input_rad),
+            segments,
+            stride: 1,
+            dense: None,
+            source: match &self.source {
+                Source::Channels { in_phase, quadrature } => {
+                    Source::Channels { in_phase: both(in_phase), quadrature: quadrature.as_ref().map(both) }
+                }
+                Source::Angle { theta_rad, amplitude } => {
+                    Source::Angle { theta_rad: of(theta_rad), amplitude: *amplitude }
+                }
+            },
+            commands: self.commands.as_ref().map(|[a, q]| [command(a), command(q)]),
+            temp_c: self.temp_c.as_deref().map(of),
+            warmer_k: of(&self.warmer_k),
+            turn_rad_s: of(&self.turn_rad_s),
+        }
+    }
+
+    /// The run with every sample of the beginnings of its segments, as many segments as it has itself.
+    pub(crate) fn dense(&self) -> &Self {
+        self.dense.as_deref().unwrap_or(self)
+    }
+
+    /// The run was thinned.
+    pub(crate) fn is_thinned(&self) -> bool {
+        self.dense.is_some()
     }
 
     /// A rotation run as one segment from its first sample to its last.
@@ -123,8 +202,20 @@ impl Track {
         let segments = vec![Segment { range: 0..recording.t_s.len(), role }];
         let (t_s, turn_rad_s) = (recording.t_s, Vec::new());
         let warmer_k = Vec::new();
-        let mut track =
-            Self { name, file, t_s, input_rad, segments, stride: 1, source, commands, temp_c, warmer_k, turn_rad_s };
+        let mut track = Self {
+            name,
+            file,
+            t_s,
+            input_rad,
+            segments,
+            stride: 1,
+            dense: None,
+            source,
+            commands,
+            temp_c,
+            warmer_k,
+            turn_rad_s,
+        };
         if track.has_commands() {
             track.turn_rad_s = (0..track.t_s.len()).into_par_iter().map(|i| track.turn(i)).collect();
         }
@@ -195,6 +286,9 @@ impl Track {
     /// Sets the temperature that parameters refer to, °C.
     pub(crate) fn refer_to(&mut self, reference_c: f64) {
         self.warmer_k = self.temp_c.iter().flatten().map(|t| t - reference_c).collect();
+        if let Some(dense) = &mut self.dense {
+            dense.refer_to(reference_c);
+        }
     }
 
     /// How fast the pattern turned around sample `i`, as it was read, rad/s: less than a quarter turn between samples.
@@ -425,4 +519,80 @@ fn segments(t: &[f64], settled: Range<usize>, role: Role, split: bool) -> Vec<Se
 /// A run's file, for messages.
 pub(crate) fn run_name(run: &Run) -> String {
     run.recording.source.display().to_string()
+}
+
+#[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    const TURN_PER_SAMPLE: f64 = 0.01;
+
+    /// Ten times as many samples as are needed, the last quarter held out; commands that go with the pattern.
+    fn long() -> Track {
+        let n = 10 * ENOUGH_SAMPLES;
+        let turned = |i: usize| TURN_PER_SAMPLE * i as f64;
+        let column = |f: &dyn Fn(f64) -> f64| Some((0..n).map(|i| f(turned(i))).collect());
+        let recording = Recording {
+            t_s: (0..n).map(|i| 1e-3 * i as f64).collect(),
+            table_deg: column(&|a| -a.to_degrees()),
+            xc_v: column(&f64::cos),
+            yc_v: column(&f64::sin),
+            vas_v: column(&|a| 0.3 + (4.0 * a).sin()),
+            vqc_v: column(&|a| (2.0 * a).cos()),
+            temp_c: column(&|a| 20.0 + 1e-4 * a),
+            ..Recording::default()
+        };
+        let (file, kind) = ("long.csv".into(), crate::recording::RunKind::Rotation);
+        let run = Run { kind, file, settle_s: 2.0, role: Role::Fit, amplitude: None, recording };
+        Track::new(run, std::f64::consts::PI, true).expect("a track")
+    }
+
+    #[test]
+    fn a_long_run_is_thinned_as_far_as_its_pattern_turns_little_and_keeps_the_beginnings_of_its_segments() {
+        let whole = long();
+        let mut track = long();
+        track.thin(TURN_PER_SAMPLE / 1e-3);
+        let width = 10; // of as many samples as are needed; its pattern might turn by twenty of these steps
+        assert!(track.is_thinned() && !whole.is_thinned());
+        assert_eq!(track.segments.len(), 2);
+        for (thin, full) in track.segments.iter().zip(&whole.segments) {
+            assert_eq!(thin.role, full.role);
+            assert_eq!(thin.range.len(), full.range.len().div_ceil(width));
+            for (at, i) in thin.range.clone().zip(full.range.clone().step_by(width)) {
+                assert_eq!(track.t_s[at].to_bits(), whole.t_s[i].to_bits());
+                assert_eq!(track.input_rad[at].to_bits(), whole.input_rad[i].to_bits());
+                assert_eq!(track.envelope(at), whole.envelope(i));
+                let [thinned, as_it_was] =
+                    [track.commands(at, 1), whole.commands(i, width)].map(|c| c.expect("recorded"));
+                assert_eq!(thinned.now, as_it_was.now);
+                assert_eq!(thinned.turn_rad_s.to_bits(), as_it_was.turn_rad_s.to_bits());
+            }
+        }
+        assert_eq!(track.dense().segments.len(), whole.segments.len());
+        for (dense, full) in track.dense().segments.iter().zip(&whole.segments) {
+            assert_eq!(dense.range.len(), full.range.len().min(DENSE_SAMPLES));
+            for (at, i) in dense.range.clone().zip(full.range.clone()) {
+                assert_eq!(track.dense().t_s[at].to_bits(), whole.t_s[i].to_bits());
+                assert_eq!(track.dense().commands(at, 1).map(|c| c.now), whole.commands(i, 1).map(|c| c.now));
+            }
+        }
+        // where its pattern turns faster, by less
+        let mut fast = long();
+        fast.thin(5.0 * TURN_PER_SAMPLE / 1e-3);
+        assert_eq!(fast.segments[0].range.len(), whole.segments[0].range.len().div_ceil(4));
+        // from the recording's start on: what the input does before a segment adds up
+        assert!(track.t_s[0] < 1e-9 && track.dense().t_s[0] < 1e-9);
+        track.refer_to(20.0);
+        let (at, dense) = (track.segments[1].range.start, track.dense().segments[1].range.start);
+        assert!(track.warmer_k(at) > 0.0 && (track.warmer_k(at) - track.dense().warmer_k(dense)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_run_of_samples_that_are_all_needed_stays_as_it_is() {
+        let mut track = long();
+        track.thin(30.0 * TURN_PER_SAMPLE / 1e-3);
+        assert!(!track.is_thinned());
+        assert_eq!(track.dense().t_s.len(), long().t_s.len());
+    }
 }

@@ -164,9 +164,9 @@ pub(crate) fn drives_that_saturate(dataset: &Dataset, fit: &Fit) -> Option<Effec
     if !recorded || hypothesis.force_scale == 0.0 {
         return None;
     }
-    let rows: usize = dataset.tracks.iter().map(|p| p.track.samples(Role::Fit)).sum();
+    let rows: usize = dataset.tracks.iter().map(|p| p.track.dense().samples(Role::Fit)).sum();
     let mut all = Vec::new();
-    dataset.tracks.iter().for_each(|p| pairs(&p.track, hypothesis, &mut all, rows.div_ceil(LOOKED_AT).max(1)));
+    dataset.tracks.iter().for_each(|p| pairs(p.track.dense(), hypothesis, &mut all, rows.div_ceil(LOOKED_AT).max(1)));
     let actuation = hypothesis.acting(Stage::Actuation).map(|(_, m)| (m.id, m.values)).collect();
     let balance = Balance { pairs: all, actuation };
     let (n, largest) = (balance.pairs.len() as f64, balance.largest_command());

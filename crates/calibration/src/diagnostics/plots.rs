@@ -425,11 +425,11 @@ impl PlotContext<'_> {
                     });
                     (turned, angle)
                 };
-                let coarse = Stepping::every(track.stride * (segment.range.len() / (track.stride * 500)).max(1));
+                let coarse = Stepping::every((segment.range.len() / 500).max(1));
                 let middle = |angle: Vec<f64>| circular_mean(angle.into_iter(), hypothesis.period_rad);
                 let mut start = *start;
                 start.angle += middle(propagated(start, coarse).1);
-                let (turned, mut angle) = propagated(start, Stepping { stride: track.stride, spike: FAR_OFF_RAD });
+                let (turned, mut angle) = propagated(start, Stepping { stride: 1, spike: FAR_OFF_RAD });
                 let centre = middle(angle.clone());
                 for a in &mut angle {
                     *a = wrapped(*a - centre, hypothesis.period_rad);

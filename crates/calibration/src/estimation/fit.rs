@@ -8,7 +8,7 @@ use cvg_model::effects::{Role as ParameterRole, Stage};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::data::track::{Segment, Track};
+use crate::data::track::{LARGEST_TURN, Segment, Track};
 use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::sums::{Own, Sums};
@@ -134,9 +134,9 @@ pub(crate) fn fit(
     while step_number < effort.steps {
         let stride = |p: &Prepared| {
             let samples = p.track.samples(role);
-            if polishing { p.track.stride } else { thinning(&p.track, &result.hypothesis, samples, effort.thinned) }
+            if polishing { 1 } else { thinning(&p.track, &result.hypothesis, samples, effort.thinned) }
         };
-        let every_sample = tracks.iter().all(|p| stride(p) == p.track.stride);
+        let every_sample = tracks.iter().all(|p| stride(p) == 1);
         let sums: Vec<Vec<Sums>> = tracks
             .par_iter()
             .zip(&result.starts)
@@ -301,17 +301,9 @@ impl Linearised {
     }
 }
 
-/// Largest turn of the pattern between samples of a thinned track, rad: what a command that repeats with it does to the
-/// pattern stays good to 1e-5 of it.
-pub(crate) const LARGEST_TURN: f64 = 0.2;
-
 /// By how much a track is thinned where `enough` of `samples` will do, as far as the pattern turns little between them.
 pub(crate) fn thinning(track: &Track, hypothesis: &Hypothesis, samples: usize, enough: usize) -> usize {
-    let interval = (track.t_s[track.t_s.len() - 1] - track.t_s[0]) / (track.t_s.len().max(2) - 1) as f64;
-    let turn = (hypothesis.precession(track.mean_speed()) * interval).abs().max(1e-12);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
-    let resolved = (LARGEST_TURN / turn) as usize;
-    (samples / enough).min(resolved).max(track.stride)
+    (samples / enough).min(track.resolved(LARGEST_TURN, hypothesis.precession(track.mean_speed()))).max(1)
 }
 
 /// Sums of all segments of a track; those of another role stay empty, so that the order of segments is kept.
@@ -325,8 +317,7 @@ pub(super) fn collect(
 ) -> Vec<Sums> {
     let Prepared { track, noise, .. } = prepared;
     let limit = Noise { angle: widened * prepared.limit.angle, amplitude: widened * prepared.limit.amplitude };
-    let weight = stride / track.stride;
-    let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * weight as f64);
+    let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * stride as f64);
     track
         .segments
         .iter()
@@ -344,13 +335,13 @@ pub(super) fn collect(
                         slopes.copy_from_slice(row.angle_slopes);
                         own.reduce(time, &mut slopes);
                         Sums::add(&mut sums.angle, weights[0], time, &slopes, row.angle);
-                        sums.counted[0] += weight;
+                        sums.counted[0] += stride;
                         if weights[1] > 0.0 {
                             Sums::add(&mut sums.amplitude, weights[1], time, row.amplitude_slopes, row.amplitude);
-                            sums.counted[1] += weight;
+                            sums.counted[1] += stride;
                         }
                     } else {
-                        sums.set_aside += weight;
+                        sums.set_aside += stride;
                     }
                 });
             }
@@ -450,7 +441,7 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
                 let mut angle = Scores::new(n, own);
                 let mut amplitude = Scores::new(n, Own::new(0.0, None));
                 let first = prepared.track.t_s[segment.range.start];
-                let stepping = Stepping { stride: prepared.track.stride, spike: prepared.limit.angle };
+                let stepping = Stepping { stride: 1, spike: prepared.limit.angle };
                 propagate(&prepared.track, segment, &fit.hypothesis, &sorted, *start, stepping, |row| {
                     if row.angle.abs() <= prepared.limit.angle {
                         let time = prepared.track.t_s[row.index] - first;

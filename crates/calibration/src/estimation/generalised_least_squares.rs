@@ -8,8 +8,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::data::track::LARGEST_TURN;
 use crate::estimation::coloured_noise::{ColouredNoise, Filter, Observation, Surroundings, Whitened};
-use crate::estimation::fit::{Fit, LARGEST_TURN, Prepared, Prior};
+use crate::estimation::fit::{Fit, Prepared, Prior};
 use crate::estimation::normal::Normal;
 use crate::estimation::propagation::{Row, Start, Stepping, propagate};
 use crate::estimation::restricted_likelihood::{Sampled, strengths};
@@ -83,7 +84,7 @@ impl Problem<'_> {
         let mut columns = vec![0.0; n + 1];
         let first = p.track.t_s[segment.range.start];
         let mut before = None;
-        let stepping = Stepping { stride: p.track.stride, spike: p.limit.angle };
+        let stepping = Stepping { stride: 1, spike: p.limit.angle };
         propagate(&p.track, segment, &fit.hypothesis, &self.unknowns, fit.starts[t][s], stepping, |row: &Row<'_>| {
             if row.angle.abs() > p.limit.angle {
                 return;
@@ -112,7 +113,7 @@ impl Problem<'_> {
             .into_par_iter()
             .map(|at| {
                 let track = &self.tracks[at.0].track;
-                let count = track.segments[at.1].range.len() / track.stride;
+                let count = track.segments[at.1].range.len();
                 let range = &track.segments[at.1].range;
                 let span = track.t_s[range.end - 1] - track.t_s[range.start];
                 let turn = (fit.hypothesis.precession(track.mean_speed()) * span / count.max(1) as f64).abs();

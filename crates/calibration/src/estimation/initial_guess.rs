@@ -2,8 +2,10 @@
 //!
 //! From here on residuals are small against the period, so no angle is ever unwrapped against its neighbour again.
 
+use rayon::prelude::*;
+
 use crate::data::agreement::Gain;
-use crate::data::track::{Track, wrapped};
+use crate::data::track::{Segment, Track, wrapped};
 use crate::error::Refusal;
 use crate::estimation::propagation::Start;
 use crate::estimation::statistics::{circular_mean, line, median, robust_deviation};
@@ -34,19 +36,16 @@ pub(crate) enum Guess {
     Settled(f64),
 }
 
+/// Bearing of sample `i` of a track under a hypothesis, rad.
+pub(crate) fn bearing(track: &Track, hypothesis: &Hypothesis, i: usize) -> f64 {
+    hypothesis.bearing(&hypothesis.unread(track.envelope(i), &track.moment(i, 0.0)))
+}
+
 /// Bearings of a track under a hypothesis, rad, per segment, every `stride` samples.
 pub(crate) fn bearings(track: &Track, hypothesis: &Hypothesis, stride: usize) -> Vec<Vec<f64>> {
-    track
-        .segments
-        .iter()
-        .map(|s| {
-            s.range
-                .clone()
-                .step_by(stride)
-                .map(|i| hypothesis.bearing(&hypothesis.unread(track.envelope(i), &track.moment(i, 0.0))))
-                .collect()
-        })
-        .collect()
+    let of =
+        |s: &Segment| s.range.clone().into_par_iter().step_by(stride).map(|i| bearing(track, hypothesis, i)).collect();
+    track.segments.iter().map(of).collect()
 }
 
 /// Finds the motion of a track: tries the given angular gain and what neighbouring samples say, and keeps what leaves least.
@@ -73,7 +72,7 @@ pub(crate) fn motion(track: &Track, hypothesis: &Hypothesis, guess: Guess) -> Re
 }
 
 /// Median ln of the amplitude over a segment.
-fn mean_ln_amplitude(track: &Track, segment: &crate::data::track::Segment, hypothesis: &Hypothesis) -> f64 {
+fn mean_ln_amplitude(track: &Track, segment: &Segment, hypothesis: &Hypothesis) -> f64 {
     let stride = (segment.range.len() / 1000).max(1);
     let mut values: Vec<f64> = segment
         .range

@@ -4,10 +4,12 @@ use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Sta
 use nalgebra::{Matrix2, Vector2};
 
 use crate::data::plausibility::{without_dead_command, without_held_commands};
+use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
+use crate::estimation::initial_guess::Motion;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
@@ -106,16 +108,7 @@ impl Dataset {
         let mut gains = Vec::new();
         for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
             gains.push((motion.angular_gain, motion.travel.powi(2) * track.t_s.len() as f64));
-            let limit = Noise { angle: SPIKE * motion.deviation + LEAST_NOISE, amplitude: f64::INFINITY };
-            let by_amplitude = instrument == Instrument::Sensor && track.has_amplitude();
-            let noise = Noise {
-                angle: motion.deviation.max(LEAST_NOISE),
-                amplitude: if by_amplitude { motion.deviation.max(LEAST_NOISE) } else { f64::INFINITY },
-            };
-            let white = noise;
-            // what a split of the frequencies does to the pattern goes with a quadrature that nobody recorded
-            let drifts = instrument == Instrument::Gyroscope && !track.records_the_loops();
-            prepared.push(Prepared { noise, white, limit, starts: motion.starts, drifts, track });
+            prepared.push(prepared_run(track, motion, instrument));
         }
         if prepared.iter().all(|p| p.track.samples(Role::Fit) == 0) {
             return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
@@ -127,6 +120,10 @@ impl Dataset {
         if instrument == Instrument::Sensor && stated * start.angular_gain < 0.0 {
             start.follows_input = true;
             start.angular_gain = -start.angular_gain;
+        }
+        for p in &mut prepared {
+            let precession = start.precession(p.track.mean_speed());
+            p.track.thin(precession);
         }
         if !prepared.iter().any(|p| p.track.has_commands()) {
             start.damping_per_s = belief::DAMPING_PER_S;
@@ -281,17 +278,16 @@ impl Dataset {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for p in &self.tracks {
             for (segment, start) in p.track.segments.iter().zip(&p.starts).filter(|(s, _)| s.role == Role::Fit) {
-                let stride = p.track.stride;
                 let mut last: Option<(f64, [f64; 3])> = None;
                 let (mut sums, mut rows) = ([0.0; 3], Vec::new());
-                let stepping = Stepping { stride, spike: p.limit.angle };
+                let stepping = Stepping { stride: 1, spike: p.limit.angle };
                 propagate(&p.track, segment, hypothesis, &none, *start, stepping, |row| {
                     if row.angle.abs() > stepping.spike {
                         return;
                     }
                     let pendulum = row.vibration.pendulum();
                     let line = pendulum.r.hypot(pendulum.s);
-                    let Some(v) = p.track.commands(row.index, stride).filter(|_| line > 0.0) else { return };
+                    let Some(v) = p.track.commands(row.index, 1).filter(|_| line > 0.0) else { return };
                     let (sin, cos) = (pendulum.s / line, pendulum.r / line);
                     let command = hypothesis.force_scale * v.now.v_qc / pendulum.e.sqrt();
                     let rates = [command, -0.5 * sin, 0.5 * cos];
@@ -398,6 +394,17 @@ impl Dataset {
                 Noise { angle: SPIKE * angle.max(LEAST_NOISE), amplitude: SPIKE * left.amplitude.max(LEAST_NOISE) };
         }
     }
+}
+
+/// A run with what its first look leaves for its noise.
+fn prepared_run(track: Track, motion: Motion, instrument: Instrument) -> Prepared {
+    let deviation = motion.deviation.max(LEAST_NOISE);
+    let by_amplitude = instrument == Instrument::Sensor && track.has_amplitude();
+    let noise = Noise { angle: deviation, amplitude: if by_amplitude { deviation } else { f64::INFINITY } };
+    let limit = Noise { angle: SPIKE * motion.deviation + LEAST_NOISE, amplitude: f64::INFINITY };
+    // what a split of the frequencies does to the pattern goes with a quadrature that nobody recorded
+    let drifts = instrument == Instrument::Gyroscope && !track.records_the_loops();
+    Prepared { noise, white: noise, limit, starts: motion.starts, drifts, track }
 }
 
 /// Mean temperature of what is fitted, °C, where one was recorded.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::data::track::{Segment, Track};
+use crate::data::track::{DENSE_SAMPLES, Segment, Track};
 use crate::estimation::fit::{Prepared, thinning};
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::statistics::circular_mean;
@@ -13,24 +13,19 @@ use crate::recording::Role;
 /// What part of a segment is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Window {
-    /// all of it, as thinned as its track
+    /// all of it, thinned where it is long
     Whole,
     /// its beginning, every sample
     Dense,
 }
 
-/// Samples of a dense window.
-const DENSE_SAMPLES: usize = 1 << 16;
-
 impl Window {
-    fn of(self, track: &Track, segment: &Segment) -> (Segment, usize) {
-        match self {
-            Self::Whole => (segment.clone(), track.stride),
-            Self::Dense => {
-                let r = &segment.range;
-                (Segment { range: r.start..r.end.min(r.start + DENSE_SAMPLES), role: segment.role }, 1)
-            }
-        }
+    /// The samples of segment `number` of a track that are looked at.
+    fn of(self, track: &Track, number: usize) -> (&Track, Segment) {
+        let track = if self == Self::Dense { track.dense() } else { track };
+        let Segment { range, role } = track.segments[number].clone();
+        let end = if self == Self::Dense { range.end.min(range.start + DENSE_SAMPLES) } else { range.end };
+        (track, Segment { range: range.start..end, role })
     }
 }
 
@@ -51,11 +46,10 @@ pub(crate) fn residuals(
         .zip(starts)
         .enumerate()
         .map(|(number, (prepared, starts))| {
-            let track = &prepared.track;
             let mut out = Vec::new();
-            for (segment, start) in track.segments.iter().zip(starts) {
+            for (at, start) in starts.iter().enumerate() {
+                let (track, segment) = window.of(&prepared.track, at);
                 if segment.role == role {
-                    let (segment, stride) = window.of(track, segment);
                     let mut r = Residual::new(number, &segment);
                     let mut start = *start;
                     if role == Role::Holdout {
@@ -65,7 +59,7 @@ pub(crate) fn residuals(
                         propagate(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
                         start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
                     }
-                    let stepping = Stepping { stride, spike: prepared.limit.angle };
+                    let stepping = Stepping { stride: 1, spike: prepared.limit.angle };
                     propagate(track, &segment, hypothesis, &none, start, stepping, |row| r.push(track, row));
                     out.push(r);
                 }

@@ -8,7 +8,7 @@ use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, sampling, 
 use crate::data::slips::slips;
 use crate::data::track::{Track, run_name, wrapped};
 use crate::error::Refusal;
-use crate::estimation::initial_guess::{Guess, Motion, bearings, motion};
+use crate::estimation::initial_guess::{Guess, Motion, bearing, bearings, motion};
 use crate::estimation::statistics::median;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::{Instrument, Role, Run};
@@ -308,18 +308,17 @@ impl Screen {
 
 /// Steps between neighbouring samples of a track, evenly from all of it.
 fn steps(track: &Track, hypothesis: &Hypothesis) -> Steps {
-    let all = bearings(track, hypothesis, 1);
+    let bearing = |i: usize| bearing(track, hypothesis, i);
     let mut out = Steps { name: track.name.clone(), ..Steps::default() };
     let mut intervals = Vec::new();
-    let count: usize = all.iter().map(Vec::len).sum();
+    let count: usize = track.segments.iter().map(|s| s.range.len()).sum();
     let every = spread_over(count).nth(1).unwrap_or(1);
-    for (segment, bearing) in track.segments.iter().zip(&all) {
-        for i in (1..bearing.len()).step_by(every) {
-            let at = segment.range.start + i;
+    for segment in &track.segments {
+        for at in segment.range.clone().skip(1).step_by(every) {
             let input = track.input_rad[at] - track.input_rad[at - 1];
             if input.abs() > 1e-9 {
                 out.input.push(input);
-                out.angle.push(bearing[i] - bearing[i - 1]);
+                out.angle.push(bearing(at) - bearing(at - 1));
                 intervals.push(track.t_s[at] - track.t_s[at - 1]);
             }
         }

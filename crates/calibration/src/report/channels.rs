@@ -113,15 +113,14 @@ fn left(dataset: &Dataset, fit: &Fit, closed: &Hypothesis, channels: &[Channel])
     let mut amplitudes = Vec::new();
     for (number, (p, starts)) in dataset.tracks.iter().zip(&fit.starts).enumerate() {
         for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
-            let stride = p.track.stride;
             let mut base = Residual::new(number, segment);
             let mut values: Vec<Vec<f64>> = vec![Vec::new(); channels.len()];
             let mut ln_amplitude = 0.0;
-            let stepping = Stepping { stride, spike: p.limit.angle };
+            let stepping = Stepping { stride: 1, spike: p.limit.angle };
             propagate(&p.track, segment, closed, &none, *start, stepping, |row| {
                 base.push(&p.track, row);
                 ln_amplitude += row.ln_amplitude;
-                let v_qc = p.track.commands(row.index, stride).map_or(0.0, |c| c.now.v_qc);
+                let v_qc = p.track.commands(row.index, 1).map_or(0.0, |c| c.now.v_qc);
                 let sample = Sample { row, closed, v_qc };
                 for (channel, values) in channels.iter().zip(&mut values) {
                     values.push((channel.of)(&sample));

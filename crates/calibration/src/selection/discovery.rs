@@ -117,7 +117,7 @@ fn explains_as_well(dataset: &Dataset, fit: &Fit, other: &Fit) -> bool {
 fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Step)>, Refusal> {
     let before = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
     let dense =
-        dataset.tracks.iter().any(|p| p.track.stride > 1).then(|| {
+        dataset.tracks.iter().any(|p| p.track.is_thinned()).then(|| {
             evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
         });
     let candidates = candidates(dataset, &fitted.fit.hypothesis, &before, dense.as_ref().unwrap_or(&before));

@@ -303,8 +303,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "an amplitude at the end of the converter is taken",
         "instrument/src/settings.rs",
-        "s.amplitude_v > 0.9 * s.adc_full_scale_v",
-        "s.amplitude_v > s.adc_full_scale_v",
+        "self.amplitude_v > 0.9 * self.adc_full_scale_v",
+        "self.amplitude_v > self.adc_full_scale_v",
         OPEN_LOOP,
     ),
     fault(
