@@ -162,6 +162,44 @@ fn a_ring_down_of_another_device_is_named_and_left_out() {
     }
 }
 
+/// Of two ring-downs nothing tells which is of another device where their dampings differ by 2 % only. What the rotations tell of
+/// the gains by themselves does not bear out the ratio of the two.
+#[test]
+fn a_ring_down_of_a_device_that_hardly_differs_is_named_or_covered() {
+    let set = |settings: &mut Settings, id, values: &[f64]| {
+        settings.effects.retain(|e| e.id != id);
+        settings.effects.push(effect(id, values));
+        settings.effects.sort_by_key(|e| e.id);
+    };
+    let mut told = 0;
+    for (tau_s, actuation, detection, file) in [
+        (21.56, 1.0232, 1.0132, "ringdown-0.csv"),
+        (21.56, 1.0232, 1.0132, "ringdown-90.csv"),
+        (22.44, 1.0, 1.0132, "ringdown-90.csv"),
+        (21.56, RATIO, 1.005, "ringdown-90.csv"),
+        (22.44, RATIO, 1.0132, "ringdown-0.csv"),
+    ] {
+        let mut campaign = recorded(plain_paper());
+        let mut other = Settings { tau_s, seed: 77, ..plain_paper() };
+        set(&mut other, EffectId::ActuationGainMismatch, &[actuation]);
+        set(&mut other, EffectId::DetectionGainMismatch, &[detection]);
+        let mut other = recorded(other);
+        let is_it = |r: &&mut Recorded| r.file.ends_with(file);
+        *ring_downs(&mut campaign).into_iter().find(is_it).unwrap() =
+            ring_downs(&mut other).into_iter().find(is_it).unwrap().clone();
+        let report = identified(campaign).unwrap().report;
+        let ratio = report.actuation_gain_ratio;
+        println!("{tau_s} s, {actuation}, {detection}, {file}: {ratio:?}, {:?}", report.warnings);
+        assert!(
+            ratio.is_none_or(|ratio| holds(&ratio, RATIO)),
+            "{tau_s} s, {actuation}, {detection}, {file}: {ratio:?}"
+        );
+        told += usize::from(report.warnings.iter().any(|w| w.contains("another device")));
+    }
+    // the last takes the drive of this device: its ratio is right
+    assert_eq!(told, 4);
+}
+
 #[test]
 fn sound_ring_downs_are_kept_whatever_the_anisodamping() {
     let report = identified(recorded(settings())).unwrap().report;

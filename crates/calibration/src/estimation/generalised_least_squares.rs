@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::data::track::LARGEST_TURN;
 use crate::estimation::coloured_noise::{ColouredNoise, Filter, Observation, Surroundings, Whitened};
-use crate::estimation::fit::{Fit, Prepared, Prior};
+use crate::estimation::fit::{Fit, Prepared, Prior, Solution};
 use crate::estimation::normal::Normal;
 use crate::estimation::propagation::{Row, Start, Stepping, propagate};
 use crate::estimation::restricted_likelihood::{Sampled, strengths};
@@ -240,18 +240,24 @@ fn covariance(parts: &[Part], normal: &Normal) -> Option<(DMatrix<f64>, f64)> {
     let sandwich = &solution.by_noise * meat * &solution.by_noise + &solution.covariance - &solution.by_noise;
     let raise = DVector::from_fn(n, |i, _| (sandwich[(i, i)] / plain[(i, i)].max(f64::MIN_POSITIVE)).max(1.0).sqrt());
     let mut covariance = DMatrix::from_fn(n, n, |i, j| plain[(i, j)] * raise[i] * raise[j]);
-    contradicted_beliefs(&mut covariance, normal, &solution.step);
+    contradicted_beliefs(&mut covariance, normal, &solution);
     Some((covariance, disagreement))
 }
 
-/// Where the runs leave an unknown far off what ring-downs say of it, and these have a share in its value, by as much as
-/// they differ either may be wrong, with all that moves along.
-fn contradicted_beliefs(covariance: &mut DMatrix<f64>, normal: &Normal, step: &DVector<f64>) {
+/// Where the runs and the ring-downs say different things of an unknown, and both have a share in its value, either may be
+/// wrong: by as much as it is off the farther of the two it counts as uncertain, with all that moves along.
+fn contradicted_beliefs(covariance: &mut DMatrix<f64>, normal: &Normal, solution: &Solution) {
     for i in normal.free() {
-        let variance = covariance[(i, i)];
-        let [off, deviations] = normal.off_belief(i, step);
-        if deviations > DISAGREEMENT && normal.believed[i] * variance > LEAST_SHARE {
-            let along = covariance.column(i) * (off / variance);
+        let (variance, by_noise) = (covariance[(i, i)], solution.by_noise[(i, i)]);
+        let off = normal.off_belief(i, &solution.step);
+        let share = normal.believed[i] * by_noise;
+        // runs that hardly have a say need more to contradict
+        let rest = (1.0 - share).max(LEAST_SHARE);
+        // (1 − share) of what a belief and runs, whose noise may be larger than it looks, differ by
+        let expected = (rest * (rest + share * variance / by_noise) / normal.believed[i]).sqrt();
+        if off.abs() > DISAGREEMENT * expected && share > LEAST_SHARE {
+            let farther = off * (share / rest).max(1.0);
+            let along = covariance.column(i) * (farther / variance);
             covariance.ger(1.0, &along, &along, 1.0);
         }
     }

@@ -61,10 +61,9 @@ impl Normal {
         solve(&self.matrix, &self.right, 0.0, &self.considered)
     }
 
-    /// By how much a step leaves an unknown off what was believed of it, and that in deviations of the belief.
-    pub(crate) fn off_belief(&self, unknown: usize, step: &DVector<f64>) -> [f64; 2] {
-        let off = self.off[unknown] - step[unknown];
-        [off, off.abs() * self.believed[unknown].sqrt()]
+    /// By how much a step leaves an unknown off what was believed of it.
+    pub(crate) fn off_belief(&self, unknown: usize, step: &DVector<f64>) -> f64 {
+        self.off[unknown] - step[unknown]
     }
 
     /// Unknowns that are not held.

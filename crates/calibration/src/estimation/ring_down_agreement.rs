@@ -130,11 +130,25 @@ fn through_skew(hypothesis: &Hypothesis) -> f64 {
     hypothesis.member(EffectId::ActuationSkew).map_or(0.0, |skew| LARGEST_HOLD * skew.values[0].abs())
 }
 
+/// What the anisodamping adds to the damping that a ring-down shows, 1/s.
+fn anisodamping(r: &RingDown, hypothesis: &Hypothesis) -> f64 {
+    let [cos, sin] = hypothesis.member(EffectId::Anisodamping).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
+    0.5 * (cos * (2.0 * r.angle_rad).cos() + sin * (2.0 * r.angle_rad).sin())
+}
+
+/// By which share the dampings of ring-downs, less the anisodamping, differ at most.
+pub(crate) fn spread_of_dampings(all: &[RingDown], hypothesis: &Hypothesis) -> f64 {
+    let of = |pick: fn(f64, f64) -> f64, from: f64| {
+        all.iter().map(|r| 1.0 / r.tau_s - anisodamping(r, hypothesis)).fold(from, pick)
+    };
+    let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
+    if low > 0.0 { high / low - 1.0 } else { 0.0 }
+}
+
 /// Ring-downs whose damping, less the anisodamping, is not that of the others. Of two, the one that takes another drive than
 /// the rotations is odd; where nothing tells, both are.
 fn contradictions(all: &[RingDown], hypothesis: &Hypothesis, usual: Option<f64>) -> Vec<(usize, String)> {
-    let [cos, sin] = hypothesis.member(EffectId::Anisodamping).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
-    let own = |r: &RingDown| 0.5 * (cos * (2.0 * r.angle_rad).cos() + sin * (2.0 * r.angle_rad).sin());
+    let own = |r: &RingDown| anisodamping(r, hypothesis);
     let damping: Vec<f64> = all.iter().map(|r| 1.0 / r.tau_s - own(r)).collect();
     let deviation = |r: &RingDown| r.tau_error_s / (r.tau_s * r.tau_s);
     let agree = |a: usize, b: usize| {

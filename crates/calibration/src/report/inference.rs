@@ -10,6 +10,7 @@ use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
+use crate::estimation::ring_down_agreement::spread_of_dampings;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
 use crate::report::polar::polar;
@@ -33,6 +34,10 @@ pub(crate) struct Inference<'a> {
 const LARGEST_STEP: f64 = 1e-3;
 /// What a run says by itself contradicts all runs beyond this many of its standard deviations.
 pub(crate) const CONTRADICTS: f64 = 6.0;
+/// Ring-downs of one device differ by less than this share in their damping once the anisodamping is known.
+const OTHER_DAMPING: f64 = 0.01;
+/// An interval that is so many times as wide as noise makes it was widened because ring-downs and rotations differ.
+const CONTRADICTED: f64 = 3.0;
 /// A drift that contradicts what is believed of drifts, in standard deviations of that: 1 in 100.
 const UNBELIEVED: f64 = 2.33;
 
@@ -179,6 +184,18 @@ impl Inference<'_> {
                         "ring-downs (Equation 11) give an actuation gain ratio of {:.5}, all runs together {:.5}",
                         drive.ratio(),
                         estimate.value
+                    ));
+                }
+                let by_noise =
+                    unknown.and_then(|u| self.index(u)).map(|i| self.fitted.fit.by_noise[(i, i)].max(0.0).sqrt());
+                let contradicted = by_noise.is_some_and(|own| estimate.half_width() > CONTRADICTED * 1.96 * own);
+                let spread = spread_of_dampings(&self.fitted.ring_downs, self.hypothesis());
+                if contradicted && spread > OTHER_DAMPING && self.dataset.tracks_differ() {
+                    warnings.push(format!(
+                        "the rotations do not bear out the actuation gain ratio of the ring-downs, {:.5}, whose dampings differ by \
+                         {:.1} % beyond the anisodamping: is one of another device? The interval covers what either says",
+                        drive.ratio(),
+                        100.0 * spread
                     ));
                 }
             }
