@@ -60,6 +60,28 @@ fn the_level_of_drives_that_saturate_is_found() {
     assert!(count(|o| o.4 > 1.5) <= n / 20, "above 1.5 floors");
 }
 
+/// What clipped drives don't put out is not left to the force scale, the latency and with them to the angular gain: that is told as
+/// well as with drives that put out everything, whether the level is named or only likely.
+#[test]
+fn the_angular_gain_is_told_as_well_beside_drives_that_clip() {
+    let told = all(trials(6), |seed| {
+        let (clipped, ..) = device(seed);
+        let mut whole = clipped.clone();
+        whole.effects.retain(|e| e.id != EffectId::DriveSaturation);
+        let k = clipped.angular_gain;
+        let [clipped, whole] = [clipped, whole].map(|settings| identify(settings).unwrap().report.angular_gain);
+        println!("{seed}: {clipped:?}, {whole:?} without, {k}");
+        let apart = (clipped.value - whole.value).abs() / clipped.half_width();
+        (holds(&clipped, k), apart, clipped.half_width() / whole.half_width())
+    });
+    let missed = told.iter().filter(|t| !t.0).count();
+    assert!(missed <= (told.len() / 10).max(1), "{missed} of {} intervals missed", told.len());
+    assert!(told.iter().all(|(_, apart, _)| *apart < 1.0), "{told:?}");
+    // seven times as wide at 5 % over the level, and two hundred times at 10 %
+    let wide = told.iter().filter(|(_, _, wider)| *wider > 2.0).count();
+    assert!(wide <= told.len() / 6, "{told:?}");
+}
+
 #[test]
 fn drives_that_put_out_what_they_are_asked_for_are_not_named() {
     let found = all(trials(4), |seed| {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use crate::angle_sensor::{self, curve::Curve};
 use crate::carrier;
 use crate::data::copies::without_copies;
-use crate::diagnostics::drives::drives_that_saturate;
+use crate::diagnostics::drives::clipping;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::{PlotContext, PlotData};
@@ -21,7 +21,7 @@ use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, declared_hypothesis, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::free_decay;
-use crate::model::hypothesis::Hypothesis;
+use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::{Campaign, Reference, Role, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
@@ -161,17 +161,26 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     (options.progress)("fitting the declared model");
     let paper = declared_hypothesis(&dataset.start);
     dataset.require_driven_rotations(&paper)?;
-    let explained = |dataset: &mut Dataset| {
-        let declared = fit_with_ring_downs(dataset, &paper)?;
+    let explained = |dataset: &mut Dataset, declared: &Hypothesis| {
+        let declared = fit_with_ring_downs(dataset, declared)?;
         let declared_fit = declared.fit.clone();
         let (fitted, steps) =
             if options.discover { discover(dataset, declared, options.progress)? } else { (declared, Vec::new()) };
         Ok::<_, Refusal>((declared_fit, fitted, steps))
     };
-    let (mut declared_fit, mut fitted, mut steps) = explained(&mut dataset)?;
+    let (mut declared_fit, mut fitted, mut steps) = explained(&mut dataset, &paper)?;
     if dataset.without_foreign_ring_downs(&fitted.fit.hypothesis)? {
         (options.progress)("beginning anew without the ring-downs of another device");
-        (declared_fit, fitted, steps) = explained(&mut dataset)?;
+        (declared_fit, fitted, steps) = explained(&mut dataset, &paper)?;
+    }
+    if let Some(found) = options.discover.then(|| clipping(&dataset, &fitted.fit.hypothesis)).flatten() {
+        (options.progress)("beginning anew with drives that clip");
+        dataset.clipping = Some((found.inverse_level.value, found.inverse_level.half_width() / 1.96));
+        // from where the fit without it ended: what drives can't put out moves it little
+        let mut clipped = declared_fit.hypothesis.clone();
+        let member = clipped.admit(EffectId::DriveSaturation, Origin::Declared);
+        clipped.members[member].values[0] = found.inverse_level.value;
+        (declared_fit, fitted, steps) = explained(&mut dataset, &clipped)?;
     }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
@@ -179,7 +188,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let warnings = std::mem::take(&mut dataset.warnings);
-    let drives = options.discover.then(|| drives_that_saturate(&dataset, &fitted.fit)).flatten();
+    let drives = dataset.clipping.and_then(|_| clipping(&dataset, &fitted.fit.hypothesis)?.report());
     let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors, drives };
     found.report(head, warnings, with_plots)
 }
@@ -329,7 +338,9 @@ impl Found {
             readout_unit: None,
         };
         report.warnings.extend(left_over(&report.heldout));
-        let hypothesis = self.fitted.fit.hypothesis.clone();
+        let mut hypothesis = self.fitted.fit.hypothesis.clone();
+        // what drives can't put out is not undone
+        hypothesis.members.retain(|m| m.id != EffectId::DriveSaturation);
         let mut calibration = Calibration { device: report.device.clone(), hypothesis, provenance };
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
@@ -452,8 +463,8 @@ fn left_over(heldout: &Heldout) -> Option<String> {
 }
 
 /// What drives that clip mean for the rest.
-const CLIPPED_DRIVES: &str = "the drives clip: angular gain and actuation gain ratio are fitted as if they gave what they were \
-                              told, which their intervals do not allow for; a recording at a smaller amplitude would tell";
+const CLIPPED_DRIVES: &str = "the drives clip: the fit counts with what they put out at the level that was found, and no calibration \
+                              undoes it; a smaller amplitude, or limits of the commands below that level, would avoid it";
 
 /// Says what an effect cannot be told from, and what would.
 fn confounded(e: &EffectReport) -> String {

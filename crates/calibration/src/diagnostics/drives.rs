@@ -2,14 +2,13 @@
 //! Δω cos 2θ_ω sin 2θ), has the force itself in it: drives that clip at a level break it wherever a command is beyond that, and
 //! no share of the angle says as much, since the energy command that clips with it is small beside what holds a split.
 //!
-//! It refuses to look at the angle, and to be part of a fit of it.
+//! It refuses to look at the angle. A fit of that takes the level from here, with its uncertainty.
 
 use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::AxisForces;
 use cvg_model::effects::{EffectId, Stage, Values};
 
 use crate::data::track::Track;
-use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::linear::NormalEquations;
 use crate::estimation::statistics::robust_deviation;
@@ -18,9 +17,12 @@ use crate::recording::Role;
 use crate::report::{EffectReport, Estimate, ParameterReport};
 
 /// Pairs of neighbouring samples that are looked at.
-const LOOKED_AT: usize = 6000;
-/// The pattern turns by less than this between neighbours, rad: the mean of two commands is then what acted.
+const LOOKED_AT: usize = 20_000;
+/// The pattern turns by less than this between neighbours, rad: what acted between them is then told by the commands around.
 const LARGEST_TURN_RAD: f64 = 0.15;
+/// The mean between the inner two of four even samples: that of the cubic through them. A mean of two would lose a share of what
+/// goes with 2θ that grows with the rate, as drives that clip do.
+const MEAN: [f64; 4] = [-1.0 / 24.0, 13.0 / 24.0, 13.0 / 24.0, -1.0 / 24.0];
 /// Quadratures further from the mean of their neighbours than so many robust deviations are spikes.
 const SPIKE: f64 = 20.0;
 /// The largest command over the level that is tried.
@@ -33,6 +35,8 @@ const MUCH_MORE: f64 = 2.0;
 /// What a level has to gain in 2 ln likelihood after its price, and the share of the mean square that it may leave.
 const LEAST_GAIN: f64 = 12.0;
 const LARGEST_SHARE: f64 = 0.95;
+/// A level that gains as much in 2 ln likelihood is likely enough to be allowed for: one in 100 by chance.
+const LIKELY: f64 = 6.6;
 /// Fewest pairs with a command beyond the level.
 const FEWEST_BEYOND: usize = 20;
 
@@ -43,7 +47,7 @@ struct Instant {
     per_amplitude: f64,
 }
 
-/// Two neighbouring samples.
+/// Two neighbouring samples, and those around them.
 struct Pair {
     /// change of q/a, 1/s, and its mean
     widening: f64,
@@ -51,7 +55,7 @@ struct Pair {
     /// of the pattern, mean
     cos2: f64,
     sin2: f64,
-    ends: [Instant; 2],
+    around: [Instant; 4],
 }
 
 /// The pairs of a track whose commands tell what acted between them.
@@ -71,21 +75,25 @@ fn pairs(track: &Track, hypothesis: &Hypothesis, out: &mut Vec<Pair>, stride: us
         if !turns_little || bent(i).abs() > limit || bent(i + 1).abs() > limit {
             continue;
         }
-        let [(a, before), (b, after)] = [quadrature(i), quadrature(i + 1)];
-        let instant = |z: &cvg_model::Envelope<f64>, i: usize| {
+        let [before, after] = [quadrature(i).1, quadrature(i + 1).1];
+        let around = [i - 1, i, i + 1, i + 2].map(|i| {
+            let z = quadrature(i).0;
             let p = z.pendulum();
-            Instant { volts: track.moment(i, 0.0).drive, axis: major_axis(z, &p), per_amplitude: 1.0 / p.e.sqrt() }
-        };
-        let ends = [instant(&a, i), instant(&b, i + 1)];
-        let mean = |f: fn(&Direction<f64>) -> f64| 0.5 * (f(&ends[0].axis) + f(&ends[1].axis));
+            Instant { volts: track.moment(i, 0.0).drive, axis: major_axis(&z, &p), per_amplitude: 1.0 / p.e.sqrt() }
+        });
         out.push(Pair {
             widening: (after - before) / dt,
             q: 0.5 * (before + after),
-            cos2: mean(|d| d.cos * d.cos - d.sin * d.sin),
-            sin2: mean(|d| 2.0 * d.sin * d.cos),
-            ends,
+            cos2: mean(&around, |at| at.axis.cos * at.axis.cos - at.axis.sin * at.axis.sin),
+            sin2: mean(&around, |at| 2.0 * at.axis.sin * at.axis.cos),
+            around,
         });
     }
+}
+
+/// The mean of `of` between the inner two of four samples.
+fn mean(around: &[Instant; 4], of: impl Fn(&Instant) -> f64) -> f64 {
+    around.iter().zip(MEAN).map(|(at, share)| share * of(at)).sum()
 }
 
 /// The quadrature balance of a campaign.
@@ -98,18 +106,17 @@ struct Balance {
 impl Balance {
     /// What a pair was pushed by, per unit of force scale and amplitude, where drives clip at 1/`inverse_level`.
     fn pushed(&self, pair: &Pair, inverse_level: f64) -> f64 {
-        let of = |end: &Instant| {
-            let clipped = EffectId::DriveSaturation.actuate(&[inverse_level, 0.0, 0.0, 0.0], end.volts);
+        mean(&pair.around, |at| {
+            let clipped = EffectId::DriveSaturation.actuate(&[inverse_level, 0.0, 0.0, 0.0], at.volts);
             let f = self.actuation.iter().fold(clipped, |f, (id, values)| id.actuate(values, f));
-            (end.axis.cos * f.y_c - end.axis.sin * f.x_c) * end.per_amplitude
-        };
-        0.5 * (of(&pair.ends[0]) + of(&pair.ends[1]))
+            (at.axis.cos * f.y_c - at.axis.sin * f.x_c) * at.per_amplitude
+        })
     }
 
     /// Mean square of what is left of q̇/a with the force scale, the split and the damping that leave least.
     fn left(&self, inverse_level: f64) -> f64 {
-        let rows: Vec<[f64; 4]> =
-            self.pairs.iter().map(|p| [self.pushed(p, inverse_level), p.sin2, p.cos2, p.q]).collect();
+        let row = |p: &Pair| [self.pushed(p, inverse_level), p.sin2, p.cos2, p.q];
+        let rows: Vec<[f64; 4]> = self.pairs.iter().map(row).collect();
         let mut equations = NormalEquations::new(4);
         for (row, pair) in rows.iter().zip(&self.pairs) {
             equations.add(row, pair.widening);
@@ -123,7 +130,7 @@ impl Balance {
 
     fn largest_command(&self) -> f64 {
         let size = |f: &AxisForces<f64>| f.x_c.hypot(f.x_s).max(f.y_c.hypot(f.y_s));
-        let mut all: Vec<f64> = self.pairs.iter().map(|p| size(&p.ends[0].volts)).collect();
+        let mut all: Vec<f64> = self.pairs.iter().map(|p| size(&p.around[1].volts)).collect();
         all.sort_by(f64::total_cmp);
         // a few may be spikes
         all.get(all.len().saturating_sub(1 + FEWEST_BEYOND / 2)).copied().unwrap_or_default()
@@ -145,6 +152,21 @@ impl Balance {
         (best > 0).then(|| (self.refined(level(best - 1), level((best + 1).min(TRIED))), without))
     }
 
+    /// How far from 1/level that leaves `least` the noise may move it: to where 1/n more is left, on the farther side. Near the
+    /// largest command what is left is no parabola.
+    fn deviation(&self, best: f64, least: f64) -> f64 {
+        let more = least * (1.0 + 1.0 / self.pairs.len() as f64);
+        let reached = |far: f64| {
+            let (mut near, mut far) = (best, far);
+            for _ in 0..REFINED {
+                let middle = 0.5 * (near + far);
+                if self.left(middle) < more { near = middle } else { far = middle }
+            }
+            (far - best).abs()
+        };
+        reached(0.0).max(reached(2.0 * best))
+    }
+
     /// 1/level that leaves least between two, by the golden section.
     fn refined(&self, mut low: f64, mut high: f64) -> f64 {
         let share = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -157,9 +179,22 @@ impl Balance {
     }
 }
 
-/// The level at which the drives of a campaign clip, where their commands tell it.
-pub(crate) fn drives_that_saturate(dataset: &Dataset, fit: &Fit) -> Option<EffectReport> {
-    let hypothesis = &fit.hypothesis;
+/// What the quadrature balance of a campaign tells of a level at which its drives clip.
+#[derive(Debug, Clone)]
+pub(crate) struct Clipping {
+    pub(crate) inverse_level: Estimate,
+    /// rms of what is left of q̇/a without it and with it, 1/s
+    left: [f64; 2],
+    /// in 2 ln likelihood after its price
+    gain: f64,
+    /// of samples with a command beyond the level
+    share: f64,
+    /// it is told, and not only possible
+    is_told: bool,
+}
+
+/// The level at which the drives of a campaign clip, where their commands tell it or make it likely.
+pub(crate) fn clipping(dataset: &Dataset, hypothesis: &Hypothesis) -> Option<Clipping> {
     let recorded = dataset.tracks.iter().all(|p| p.track.records_the_loops());
     if !recorded || hypothesis.force_scale == 0.0 {
         return None;
@@ -167,7 +202,8 @@ pub(crate) fn drives_that_saturate(dataset: &Dataset, fit: &Fit) -> Option<Effec
     let rows: usize = dataset.tracks.iter().map(|p| p.track.dense().samples(Role::Fit)).sum();
     let mut all = Vec::new();
     dataset.tracks.iter().for_each(|p| pairs(p.track.dense(), hypothesis, &mut all, rows.div_ceil(LOOKED_AT).max(1)));
-    let actuation = hypothesis.acting(Stage::Actuation).map(|(_, m)| (m.id, m.values)).collect();
+    let others = hypothesis.acting(Stage::Actuation).filter(|(_, m)| m.id != EffectId::DriveSaturation);
+    let actuation = others.map(|(_, m)| (m.id, m.values)).collect();
     let balance = Balance { pairs: all, actuation };
     let (n, largest) = (balance.pairs.len() as f64, balance.largest_command());
     if n < 10.0 * FEWEST_BEYOND as f64 || largest <= 0.0 {
@@ -175,28 +211,38 @@ pub(crate) fn drives_that_saturate(dataset: &Dataset, fit: &Fit) -> Option<Effec
     }
     let (x, before) = balance.best(largest)?;
     let after = balance.left(x);
-    let gain = n * (before / after).ln() - n.ln() - 2.0 * ((TRIED + REFINED) as f64).ln();
-    let beyond = |end: &Instant| {
-        let v = &end.volts;
+    let by_chance = n * (before / after).ln();
+    let gain = by_chance - n.ln() - 2.0 * ((TRIED + REFINED) as f64).ln();
+    let beyond = |at: &Instant| {
+        let v = &at.volts;
         v.x_c.hypot(v.x_s).max(v.y_c.hypot(v.y_s)) * x > 1.0
     };
-    let count = balance.pairs.iter().filter(|p| beyond(&p.ends[0])).count();
-    let is_told = gain > LEAST_GAIN && after < LARGEST_SHARE * before && count >= FEWEST_BEYOND;
-    if !is_told {
+    let count = balance.pairs.iter().filter(|p| beyond(&p.around[1])).count();
+    if by_chance < LIKELY {
         return None;
     }
-    // what is left grows with the square of the distance, and by 1/n of itself within a standard deviation
-    let step = 2e-3 * x;
-    let curvature = (balance.left(x + step) + balance.left(x - step) - 2.0 * after) / (step * step);
-    let by_noise = (2.0 * after / (n * curvature.max(f64::MIN_POSITIVE))).sqrt();
-    // the mean of two commands is what acted between them but for this share
-    let deviation = by_noise.hypot(LARGEST_TURN_RAD.powi(2) / 12.0 * x);
-    Some(told(Estimate::new(x, deviation), [before, after], gain, count as f64 / n))
+    let is_told = gain > LEAST_GAIN && after < LARGEST_SHARE * before && count >= FEWEST_BEYOND;
+    // the mean of the commands is what acted between two samples but for this share
+    let deviation = balance.deviation(x, after).hypot(LARGEST_TURN_RAD.powi(2) / 12.0 * x);
+    Some(Clipping {
+        inverse_level: Estimate::new(x, deviation),
+        left: [before.sqrt(), after.sqrt()],
+        gain,
+        share: count as f64 / n,
+        is_told,
+    })
+}
+
+impl Clipping {
+    /// What is reported of it, where it is told.
+    pub(crate) fn report(&self) -> Option<EffectReport> {
+        self.is_told.then(|| told(self.inverse_level, self.left, self.gain, self.share))
+    }
 }
 
 fn told(inverse_level: Estimate, left: [f64; 2], gain: f64, share: f64) -> EffectReport {
     let d = EffectId::DriveSaturation.description();
-    let [before, after] = left.map(f64::sqrt);
+    let [before, after] = left;
     EffectReport {
         id: d.id.into(),
         origin: Origin::Discovered,

@@ -62,6 +62,8 @@ pub(crate) struct Dataset {
     pub(crate) energy_balance: Option<(f64, f64)>,
     /// Δω along both axes and its uncertainty, rad/s, as the quadrature loop tells it
     pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
+    /// 1/level at which the drives clip and its uncertainty, 1/V, as the quadrature balance tells it
+    pub(crate) clipping: Option<(f64, f64)>,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
     pub(crate) drive_is_free: bool,
     /// fits begin with it free and where the hypothesis has it: nothing is missing that would drag it along
@@ -144,6 +146,7 @@ impl Dataset {
             written: Vec::new(),
             energy_balance: None,
             quadrature_balance: None,
+            clipping: None,
             drive_is_free: false,
             drive_is_free_at_once: false,
             screen,
@@ -228,6 +231,11 @@ impl Dataset {
         }
         if let Some(d) = drive {
             measured(EffectId::ActuationGainMismatch, 0, d.ratio(), d.ratio() * d.ratio_error.max(1e-6));
+        }
+        if let Some((inverse_level, deviation)) = self.clipping
+            && let Some(member) = hypothesis.position(EffectId::DriveSaturation)
+        {
+            all.push(Prior { considered, ..prior(Unknown::Effect(member, 0), inverse_level, deviation) });
         }
         let silent = (0.0, belief::FORCING_PER_S / self.commanded());
         let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };

@@ -245,6 +245,10 @@ impl Inference<'_> {
 
     /// All that was fitted of a member is identified.
     pub(crate) fn identifiable(&self, at: usize, member: &Member) -> bool {
+        if member.id == EffectId::DriveSaturation {
+            // the quadrature balance tells it
+            return false;
+        }
         let parameters = member.id.description().parameters.iter().enumerate();
         let fitted: Vec<(Unknown, &Parameter)> = parameters
             .map(|(p, parameter)| (Unknown::Effect(at, p), parameter))
