@@ -6,13 +6,15 @@ use cvg_model::Float;
 
 use crate::Calibrator;
 use crate::correction::Move;
-use crate::cycle::{OPEN, TAKEN, project};
-use crate::parameters::{N, OTHERS, Parameter, Vector, dot, get, set};
-use crate::state::{Commit, Filter, State, Work};
+use crate::cycle::{OPEN, TAKEN};
+use crate::parameters::{N, OTHERS, Parameter, dot, get, set};
+use crate::regressors::CHANNELS;
+use crate::state::{Commit, State, Work};
 
 /// The slices of a commit: the symmetry of the split as a measurement; what to move; the move.
 const PROJECT: u16 = 3;
 pub(crate) const WEIGH: u16 = PROJECT + OPEN - 1;
+const ABSORB: u16 = WEIGH + 1;
 const LEARN: u16 = WEIGH + TAKEN - OPEN;
 pub(crate) const DECIDE: u16 = LEARN + 1;
 const DECIDE_PAIR: u16 = DECIDE + 1;
@@ -23,9 +25,9 @@ const BEGIN: u16 = SHARED + 1;
 const MOVE: u16 = BEGIN + 1;
 const MOVED: u16 = MOVE + Move::<f32>::PARTS;
 const LEAVE: u16 = MOVED + 1;
-const LEAVE_REST: u16 = LEAVE + 1;
-const LEFT: u16 = LEAVE_REST + 1;
-const HALF: usize = 10;
+const LEFT: u16 = LEAVE + 3;
+/// So many parameters leave in a slice.
+const LEAVING: usize = 7;
 
 /// Standard deviations of a direction that is committed.
 const SIGMAS: f64 = 3.0;
@@ -39,30 +41,9 @@ const SYMMETRY: f64 = 1e-4;
 impl<T: Float> Calibrator<T> {
     #[inline(never)]
     pub(crate) fn commit_slice(&self, s: &mut State<T>, k: u16) {
-        if s.schedule.commit == Commit::Back && k < SHARED {
-            return;
-        }
         match k {
-            0 => s.trial = Self::symmetry(s),
-            1 => {
-                s.score = -get(&s.correction.known, Parameter::QuadratureRate) - dot(&s.trial, &s.filter.mean);
-                s.filter.spread = T::zero();
-            }
-            2 => s.schedule.accept = self.symmetry_is_seen(s),
-            PROJECT..WEIGH if s.schedule.accept => {
-                let Filter { ud, work, spread, .. } = &mut s.filter;
-                *spread = *spread + project(ud, work, &s.trial, k - PROJECT);
-            }
-            WEIGH if s.schedule.accept => self.weigh(s),
-            WEIGH..LEARN if s.schedule.accept => s.filter.absorb(k - WEIGH - 1),
-            LEARN if s.schedule.accept => s.filter.learn(s.score),
-            DECIDE => {
-                s.trial = [T::zero(); N];
-                if s.schedule.stage >= 2 {
-                    self.decide_phase(s);
-                }
-            }
-            DECIDE_PAIR if s.schedule.stage >= 2 => self.decide_ratio_and_skew(s),
+            SHARED.. => self.move_slice(s, k),
+            _ if s.schedule.commit == Commit::Back => {}
             SHARE..SHARED => {
                 let (j, n) = (usize::from((k - SHARE) / 4), (k - SHARE) % 4);
                 if n < 3 {
@@ -71,16 +52,40 @@ impl<T: Float> Calibrator<T> {
                     self.share(s, j);
                 }
             }
+            _ => self.decide_slice(s, k),
+        }
+    }
+
+    /// The symmetry of the split, and what is committed of the detection.
+    #[inline(never)]
+    fn decide_slice(&self, s: &mut State<T>, k: u16) {
+        match k {
+            0 => Self::symmetry(s),
+            1 => Self::asymmetry(s),
+            2 => self.symmetry_is_seen(s),
+            DECIDE => self.decide_phase(s),
+            DECIDE_PAIR => self.decide_ratio_and_skew(s),
+            _ if !s.schedule.accept => {}
+            PROJECT..WEIGH => s.project(CHANNELS, k - PROJECT),
+            WEIGH => self.weigh(s),
+            ABSORB..LEARN => s.filter.absorb(k - ABSORB),
+            LEARN => s.filter.learn(s.score),
+            _ => {}
+        }
+    }
+
+    /// What was decided goes into force.
+    #[inline(never)]
+    fn move_slice(&self, s: &mut State<T>, k: u16) {
+        match k {
             SHARED => self.judge(s),
-            BEGIN => s.filter.work = Work::Move(Move::begin(&s.correction)),
-            MOVE..MOVED => {
-                if let Work::Move(way) = &mut s.filter.work {
-                    way.advance(&s.trial, k - MOVE);
-                }
-            }
+            BEGIN => Self::begin(s),
+            MOVE..MOVED => Self::advance(s, k - MOVE),
             MOVED => self.put_in_force(s),
-            LEAVE => Self::leave(s, 0..HALF),
-            LEAVE_REST => Self::leave(s, HALF..N),
+            LEAVE..LEFT => {
+                let first = LEAVING * usize::from(k - LEAVE);
+                Self::leave(s, first..(first + LEAVING).min(N));
+            }
             LEFT => self.end_commit(s),
             _ => {}
         }
@@ -92,7 +97,8 @@ impl<T: Float> Calibrator<T> {
     ///
     /// taken as one measurement between two commits: its row. [`State::trial`] holds it and [`State::score`] its innovation,
     /// since both begin anew with the commit.
-    fn symmetry(s: &State<T>) -> Vector<T> {
+    #[inline(never)]
+    fn symmetry(s: &mut State<T>) {
         let known = &s.correction.known;
         let believed = |p: Parameter| get(known, p) + get(&s.filter.mean, p) * p.expected::<T>();
         let mut h = [T::zero(); N];
@@ -101,14 +107,20 @@ impl<T: Float> Calibrator<T> {
         along(Parameter::DetectionRatio, -(T::half() * believed(Parameter::SplitSin)));
         along(Parameter::DetectionSkew, -(T::half() * believed(Parameter::SplitCos)));
         along(Parameter::DetectionPhase, believed(Parameter::AnisodampingSin));
-        h
+        s.trial = h;
     }
 
     #[inline(never)]
-    fn symmetry_is_seen(&self, s: &State<T>) -> bool {
+    fn asymmetry(s: &mut State<T>) {
+        s.score = -get(&s.correction.known, Parameter::QuadratureRate) - dot(&s.trial, &s.filter.mean);
+        s.filter.spread = T::zero();
+    }
+
+    #[inline(never)]
+    fn symmetry_is_seen(&self, s: &mut State<T>) {
         let phase = s.filter.ud.variance(Parameter::ForcePhase as usize).sqrt() * Parameter::ForcePhase.expected::<T>();
         let seen = s.schedule.angle_used > self.cycles(10);
-        s.schedule.stage >= 4 && seen && phase < T::from_f64(1e-3)
+        s.schedule.accept = s.schedule.stage >= 4 && seen && phase < T::from_f64(1e-3);
     }
 
     /// The equation is one: it is used again only where it says more than what is known, and no better than it holds in
@@ -137,6 +149,10 @@ impl<T: Float> Calibrator<T> {
     /// How much of the detection is committed: its phase.
     #[inline(never)]
     fn decide_phase(&self, s: &mut State<T>) {
+        s.trial = [T::zero(); N];
+        if s.schedule.stage < 2 {
+            return;
+        }
         let phase = Parameter::DetectionPhase;
         let beyond = Self::sigmas(s).squared();
         let m = get(&s.filter.mean, phase);
@@ -150,6 +166,9 @@ impl<T: Float> Calibrator<T> {
     /// given that.
     #[inline(never)]
     fn decide_ratio_and_skew(&self, s: &mut State<T>) {
+        if s.schedule.stage < 2 {
+            return;
+        }
         let ud = &s.filter.ud;
         let (ratio, skew) = (Parameter::DetectionRatio, Parameter::DetectionSkew);
         let beyond = Self::sigmas(s).squared();
@@ -218,6 +237,18 @@ impl<T: Float> Calibrator<T> {
             }
         } else if !self.is_of_a_device(s) {
             self.begin_anew(s);
+        }
+    }
+
+    #[inline(never)]
+    fn begin(s: &mut State<T>) {
+        s.filter.work = Work::Move(Move::begin(&s.correction));
+    }
+
+    #[inline(never)]
+    fn advance(s: &mut State<T>, part: u16) {
+        if let Work::Move(way) = &mut s.filter.work {
+            way.advance(&s.trial, part);
         }
     }
 

@@ -36,13 +36,21 @@ impl<T: Float> Correction<T> {
         Self { known, y_of_y: one, y_of_x: zero, drives: identity, y_inverse: one, drives_inverse: identity }
     }
 
+    /// The same, field by field: what copies more than 64 bytes at once costs firmware a call, and half as much again.
+    #[inline(always)]
+    fn copy(&self) -> Self {
+        let Self { known, y_of_y, y_of_x, drives, y_inverse, drives_inverse } = *self;
+        Self { known, y_of_y, y_of_x, drives, y_inverse, drives_inverse }
+    }
+
     //= specs/self-calibration.md#bounded
     //# Every value in force MUST be finite and one that a device can have for every input.
     /// A correction of these parts; none where they can't be inverted or no device is like that.
     pub(crate) fn of(known: Vector<T>, y_of_y: Complex<T>, y_of_x: Complex<T>, drives: Matrix<T>) -> Option<Self> {
         let zero = Complex::real(T::zero());
-        let made = Self { known, y_of_y, y_of_x, drives, y_inverse: zero, drives_inverse: Matrix::identity() };
-        made.values_are_of_a_device().then_some(made)?.inverted()
+        let mut made = Self { known, y_of_y, y_of_x, drives, y_inverse: zero, drives_inverse: Matrix::identity() };
+        let sound = made.values_are_of_a_device() && made.electronics_are_of_a_device() && made.invert();
+        sound.then_some(made)
     }
 
     fn values_are_of_a_device(&self) -> bool {
@@ -50,21 +58,26 @@ impl<T: Float> Correction<T> {
         self.known.iter().zip(&Parameter::ALL).all(|(value, p)| value.within(far(p)))
     }
 
-    /// The same with its own inverses; none where the electronics are no device's.
-    fn inverted(self) -> Option<Self> {
+    fn electronics_are_of_a_device(&self) -> bool {
         let Self { y_of_y, y_of_x, drives, .. } = self;
-        let near = |z: Complex<T>, target: T, reach: f64| {
+        let near = |z: &Complex<T>, target: T, reach: f64| {
             (z.re - target).within(T::from_f64(reach)) && z.im.within(T::from_f64(reach))
         };
         let (zero, one) = (T::zero(), T::one());
-        let plausible = near(y_of_y, one, 0.36)
+        near(y_of_y, one, 0.36)
             && near(y_of_x, zero, 0.12)
-            && near(drives.xx, one, 0.5)
-            && near(drives.yy, one, 0.5)
-            && near(drives.xy, zero, 0.2)
-            && near(drives.yx, zero, 0.2);
-        let drives_inverse = plausible.then(|| drives.inverse())??;
-        Some(Self { y_inverse: y_of_y.inverse(), drives_inverse, ..self })
+            && near(&drives.xx, one, 0.5)
+            && near(&drives.yy, one, 0.5)
+            && near(&drives.xy, zero, 0.2)
+            && near(&drives.yx, zero, 0.2)
+    }
+
+    /// Its own inverses; false where there are none.
+    fn invert(&mut self) -> bool {
+        let Some(drives_inverse) = self.drives.inverse() else { return false };
+        self.drives_inverse = drives_inverse;
+        self.y_inverse = self.y_of_y.inverse();
+        true
     }
 
     //= specs/self-calibration.md#undone
@@ -163,11 +176,11 @@ pub(crate) struct Move<T> {
 }
 
 impl<T: Float> Move<T> {
-    pub(crate) const PARTS: u16 = 7;
+    pub(crate) const PARTS: u16 = 8;
 
     pub(crate) fn begin(from: &Correction<T>) -> Self {
         let one = Complex::real(T::one());
-        Self { to: *from, yx: T::zero(), yy: one, per_yy: one, sees: false, sound: true }
+        Self { to: from.copy(), yx: T::zero(), yy: one, per_yy: one, sees: false, sound: true }
     }
 
     /// Part `n` of the way, one after the other, always with the same `delta`.
@@ -186,17 +199,16 @@ impl<T: Float> Move<T> {
             3 => add_mechanics(&mut self.to.known, delta),
             4 => self.turn_drives(delta),
             5 => self.sound = self.sound && self.to.values_are_of_a_device(),
-            6 => match self.to.inverted() {
-                Some(to) => self.to = to,
-                None => self.sound = false,
-            },
+            6 => self.sound = self.sound && self.to.electronics_are_of_a_device(),
+            7 => self.sound = self.sound && self.to.invert(),
             _ => {}
         }
     }
 
     /// Where it leads to; none where that is no instrument.
+    #[inline(always)]
     pub(crate) fn end(&self) -> Option<Correction<T>> {
-        self.sound.then_some(self.to)
+        self.sound.then(|| self.to.copy())
     }
 
     fn turn_readout(&mut self, delta: &Vector<T>) {
@@ -229,19 +241,20 @@ impl<T: Float> Move<T> {
 
     fn turn_drives(&mut self, delta: &Vector<T>) {
         let d = |p| get(delta, p);
-        let (one, zero) = (T::one(), T::zero());
-        let (scale, turn, phase) = (d(Parameter::ForceScale), d(Parameter::ForceRotation), d(Parameter::ForcePhase));
-        let change = Matrix {
-            xx: Complex::new(one + scale, phase),
-            xy: Complex::real(-turn),
-            yx: Complex::real(turn + d(Parameter::ForceSkew)),
-            yy: Complex::new(one + scale + d(Parameter::ForceRatio), phase + d(Parameter::ForcePhaseDifference)),
-        };
+        let (turn, phase) = (d(Parameter::ForceRotation), d(Parameter::ForcePhase));
+        let scale = T::one() + d(Parameter::ForceScale);
+        // [[xx, −turn], [yx, yy]] on the left; no parameter is the phase of a skew: what can't be learned isn't kept either
+        let xx = Complex::new(scale, phase);
+        let yx = turn + d(Parameter::ForceSkew);
+        let yy = Complex::new(scale + d(Parameter::ForceRatio), phase + d(Parameter::ForcePhaseDifference));
         let drives = &mut self.to.drives;
-        *drives = change.times(drives);
-        // no parameter is the phase of a skew: what can't be learned isn't kept either
-        drives.xy.im = zero;
-        drives.yx.im = zero;
+        let m = *drives;
+        *drives = Matrix {
+            xx: xx * m.xx - m.yx.times(turn),
+            xy: Complex::real((xx * m.xy - m.yy.times(turn)).re),
+            yx: Complex::real((m.xx.times(yx) + yy * m.yx).re),
+            yy: m.xy.times(yx) + yy * m.yy,
+        };
     }
 }
 

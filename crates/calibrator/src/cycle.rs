@@ -2,13 +2,13 @@
 
 use cvg_model::Float;
 
+use crate::Calibrator;
 use crate::parameters::{DETECTION, N, OTHERS, Parameter, dot};
 use crate::regressors::{CHANNELS, PARTS, part, turned};
 use crate::state::{Commit, Filter, Forgetting, State, Work};
 use crate::ud::{Ud, Update};
-use crate::{Calibrator, parameters};
 
-/// Slices that a cycle needs: none does more than some 200 instructions.
+/// Slices that a cycle needs: none does more than some 180 instructions.
 pub(crate) const SLICES: u16 = 160;
 /// Those of the first pass of a measurement, and of the second.
 const PROJECT: u16 = 7;
@@ -61,22 +61,28 @@ impl<T: Float> Calibrator<T> {
         }
     }
 
-    /// A column of what is forgotten, and the mean at last.
+    /// A column of what is forgotten; the mean and what was under way at last.
+    #[inline(never)]
     fn forget_slice(s: &mut State<T>, k: u16) {
         let Forgetting { count, done, d } = s.schedule.forgetting;
         let (count, column) = (usize::from(count), usize::from(done));
+        if k >= SLICES - 1 {
+            // the end of the cycle has its own work
+            if column > N + 1 {
+                s.schedule.commit = Commit::None;
+            }
+            return;
+        }
         if column < N {
             s.filter.ud.forget(column, count, d);
         } else if column == N {
             for mean in s.filter.mean.iter_mut().take(count) {
                 *mean = T::zero();
             }
+        } else if column == N + 1 {
             s.filter.work = Work::Measure(Update::idle());
         }
         s.schedule.forgetting.done = done.saturating_add(1);
-        if k == SLICES - 1 && column >= N {
-            s.schedule.commit = Commit::None;
-        }
     }
 
     fn slice(&self, s: &mut State<T>, k: u16) {
@@ -84,6 +90,14 @@ impl<T: Float> Calibrator<T> {
             Commit::None => {}
             Commit::Forget => return Self::forget_slice(s, k),
             Commit::Forth | Commit::Back => return self.commit_slice(s, k),
+        }
+        // most of them, and the longest: found at once
+        if (FIRST_MEASURE..GROW).contains(&k) {
+            if s.schedule.live {
+                let n = k - FIRST_MEASURE;
+                self.measure(s, usize::from(n / MEASURE), n % MEASURE);
+            }
+            return;
         }
         match k {
             0 => self.close(s),
@@ -93,23 +107,21 @@ impl<T: Float> Calibrator<T> {
             1 => s.closed.direct(&mut s.sample),
             2..DETECT => self.integrate(s, 1, usize::from(k - 2)),
             DETECT..DETECTED => s.filter.add_variance(Parameter::ForceScale as usize, k - DETECT),
-            DETECTED => {
-                s.schedule.doubt.force_scale = s.filter.spread.sqrt() * Parameter::ForceScale.expected::<T>();
-                s.schedule.doubt.rate = deviation(s, Parameter::Rate);
-            }
-            NOTICE => {
-                self.notice(s, s.schedule.doubt);
-            }
+            DETECTED => Self::doubt(s),
+            NOTICE => self.notice(s, s.schedule.doubt),
             OTHER_CHANNELS..FIRST_MEASURE => {
                 let n = k - OTHER_CHANNELS;
                 self.integrate(s, usize::from(2 * (n / INTEGRATE)), usize::from(n % INTEGRATE));
             }
-            FIRST_MEASURE..GROW => {
-                let n = k - FIRST_MEASURE;
-                self.measure(s, usize::from(n / MEASURE), n % MEASURE);
-            }
             _ => {}
         }
+    }
+
+    /// [`Doubt::of`], the first variance of which is taken already.
+    #[inline(never)]
+    fn doubt(s: &mut State<T>) {
+        s.schedule.doubt.force_scale = s.filter.spread.sqrt() * Parameter::ForceScale.expected::<T>();
+        s.schedule.doubt.rate = deviation(s, Parameter::Rate);
     }
 
     //= specs/self-calibration.md#held
@@ -131,18 +143,27 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// What was seen beyond what is known, and what each parameter should have shown of it, part by part.
-    #[inline(never)]
     pub(crate) fn integrate(&self, s: &mut State<T>, c: usize, n: usize) {
-        if n >= PARTS {
-            return self.see(s, c);
+        match n {
+            0 => self.integrate_part::<0>(s, c),
+            1 => self.integrate_part::<1>(s, c),
+            2 => self.integrate_part::<2>(s, c),
+            3 => self.integrate_part::<3>(s, c),
+            4 => self.integrate_part::<4>(s, c),
+            _ => self.see(s, c),
         }
+    }
+
+    /// Part `P` of it. It is known when it is compiled, here and below, so that its parameters and their units are, too.
+    #[inline(never)]
+    fn integrate_part<const P: usize>(&self, s: &mut State<T>, c: usize) {
         let half_s = T::half() * self.cycle_s;
-        let row = part(&s.sample, &s.correction.known, c, n != 1 || self.scaled(s), n);
+        let row = part(&s.sample, &s.correction.known, c, P != 1 || self.scaled(s), P);
         let filter = &mut s.filter;
         let of = row.first..row.end;
         let Some(shown) = filter.shown.get_mut(c).and_then(|v| v.get_mut(of.clone())) else { return };
         let (Some(mean), Some(units)) = (filter.mean.get(of.clone()), Parameter::ALL.get(of)) else { return };
-        let mut believed = if n == 0 { T::zero() } else { filter.believed };
+        let mut believed = if P == 0 { T::zero() } else { filter.believed };
         for ((((shown, mean), p), rate), direct) in shown.iter_mut().zip(mean).zip(units).zip(row.rate).zip(row.direct)
         {
             let step = (half_s * rate + direct) * p.expected();
@@ -191,18 +212,29 @@ impl<T: Float> Calibrator<T> {
     }
 
     /// The cycle is past: what of it belongs to the next one's step, part by part.
-    #[inline(never)]
     fn retire(&self, s: &mut State<T>, c: usize, n: usize) {
+        match n {
+            0 => self.retire_part::<0>(s, c),
+            1 => self.retire_part::<1>(s, c),
+            2 => self.retire_part::<2>(s, c),
+            3 => self.retire_part::<3>(s, c),
+            _ => self.retire_part::<4>(s, c),
+        }
+    }
+
+    #[inline(never)]
+    fn retire_part<const P: usize>(&self, s: &mut State<T>, c: usize) {
         let half_s = T::half() * self.cycle_s;
-        let row = part(&s.sample, &s.correction.known, c, n != 1 || self.scaled(s), n);
+        let row = part(&s.sample, &s.correction.known, c, P != 1 || self.scaled(s), P);
         let filter = &mut s.filter;
         let Some(all) = filter.shown.get_mut(c) else { return };
-        if n == PARTS - 1 {
+        if P == 2 {
+            // with a part that has little else to do
             for slot in all.get_mut(OTHERS..).unwrap_or(&mut []) {
                 *slot = self.forget * *slot;
             }
         }
-        let mut ahead = if n == 0 { T::zero() } else { filter.believed };
+        let mut ahead = if P == 0 { T::zero() } else { filter.believed };
         let of = row.first..row.end;
         let Some(shown) = all.get_mut(of.clone()) else { return };
         let (Some(mean), Some(units)) = (filter.mean.get(of.clone()), Parameter::ALL.get(of)) else { return };
@@ -213,13 +245,11 @@ impl<T: Float> Calibrator<T> {
             ahead = ahead + step * *mean;
         }
         filter.believed = ahead;
-        if n < PARTS - 1 {
-            return;
-        }
-        if c == 1 {
+        if P == PARTS - 1 && c == 1 {
             s.before.angle = ahead;
         }
-        if c == CHANNELS - 1 {
+        if P == 3 && c == CHANNELS - 1 {
+            // with the mechanics that do nothing to this channel
             s.before.y = s.sample.y;
             put(&mut s.before.y, 1, s.sample.before_next);
             s.before.late = s.sample.late;
@@ -236,12 +266,7 @@ impl<T: Float> Calibrator<T> {
             _ if !s.schedule.accept => {}
             OPEN => self.gate(s, c),
             TAKEN => self.learn(s, c),
-            1..OPEN => {
-                let Filter { ud, work, shown, spread, .. } = &mut s.filter;
-                if let Some(h) = shown.get(c) {
-                    *spread = *spread + project(ud, work, h, k - 1);
-                }
-            }
+            1..OPEN => s.project(c, k - 1),
             _ => s.filter.absorb(k - OPEN - 1),
         }
     }
@@ -407,20 +432,26 @@ fn floor<T: Float>(stage: u8) -> T {
     }
 }
 
-/// A slice of the first pass of a measurement along `h`: what it adds to the innovation's variance.
-pub(crate) fn project<T: Float>(ud: &Ud<T>, work: &mut Work<T>, h: &parameters::Vector<T>, slice: u16) -> T {
-    let Some(update) = work.update() else { return T::zero() };
-    macro_rules! columns {
-        ($($j:literal)+) => { T::zero() $(+ ud.project::<$j>(update, h))+ };
-    }
-    match slice {
-        0 => columns!(0 1 2 3 4 5 6),
-        1 => columns!(7 8 9),
-        2 => columns!(10 11),
-        3 => columns!(12 13),
-        4 => columns!(14 15),
-        5 => columns!(16 17),
-        _ => columns!(18),
+impl<T: Float> State<T> {
+    /// A slice of the first pass of a measurement along what channel `c` has shown, or along what is on trial where there is
+    /// no such channel.
+    #[inline(never)]
+    pub(crate) fn project(&mut self, c: usize, slice: u16) {
+        let Self { filter: Filter { ud, work, shown, spread, .. }, trial, .. } = self;
+        let h = shown.get(c).unwrap_or(trial);
+        let Some(update) = work.update() else { return };
+        macro_rules! columns {
+            ($($j:literal)+) => { *spread $(+ ud.project::<$j>(update, h))+ };
+        }
+        *spread = match slice {
+            0 => columns!(0 1 2 3 4 5 6),
+            1 => columns!(7 8 9),
+            2 => columns!(10 11),
+            3 => columns!(12 13),
+            4 => columns!(14 15),
+            5 => columns!(16 17),
+            _ => columns!(18),
+        };
     }
 }
 
@@ -463,8 +494,15 @@ impl<T: Float> Filter<T> {
             7 => columns!(10),
             8 => columns!(11),
             9 => columns!(12),
-            10 => columns!(13),
-            11 => first_rows!(14, 6),
+            10 => {
+                ud.absorb_diagonal::<13>(update);
+                ud.absorb_rows::<13, 0, 11>(update);
+            }
+            11 => {
+                ud.absorb_rows::<13, 11, 13>(update);
+                ud.absorb_diagonal::<14>(update);
+                ud.absorb_rows::<14, 0, 6>(update);
+            }
             12 => ud.absorb_rows::<14, 6, 14>(update),
             13 => first_rows!(15, 6),
             14 => ud.absorb_rows::<15, 6, 15>(update),

@@ -250,8 +250,7 @@ impl<T: Float> Calibrator<T> {
         state.step = state.step.saturating_add(1);
         if state.step >= self.steps {
             state.step = 0;
-            state.closed = state.sums;
-            state.sums = Sums::after(direction);
+            state.sums.hand_over(&mut state.closed, direction);
         }
     }
 

@@ -45,7 +45,7 @@ pub(crate) struct Part<T> {
 ///
 /// Without a precession that is known, force scale, damping and split are one thing: then, without `scaled_forces`, the
 /// scale is not excited, and the others are what they are in units of the force.
-#[inline]
+#[inline(always)]
 pub(crate) fn part<T: Float>(s: &Sample<T>, known: &Vector<T>, c: usize, scaled_forces: bool, n: usize) -> Part<T> {
     let at = |k: usize| FIRST.get(k).copied().unwrap_or(OTHERS);
     let mut direct = [T::zero(); LARGEST];

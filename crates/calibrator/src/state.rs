@@ -102,7 +102,7 @@ pub(crate) struct Schedule<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Forgetting<T> {
     pub(crate) count: u8,
-    /// columns of the covariance that are done; one more is the mean
+    /// columns of the covariance that are done; then the mean, then what was under way
     pub(crate) done: u8,
     pub(crate) d: T,
 }

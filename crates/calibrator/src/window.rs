@@ -74,6 +74,15 @@ impl<T: Float> Sums<T> {
         }
     }
 
+    /// A cycle is whole: it goes to `closed`, and the next one begins after a step in which the direction was `from`. Field by
+    /// field: what copies more than 64 bytes at once costs firmware a call, and half as much again.
+    #[inline(never)]
+    pub(crate) fn hand_over(&mut self, closed: &mut Self, from: (T, T)) {
+        let Self { energy, quadrature, turned, push, rate, ramp, from: began, angle, count, whole } = *self;
+        *closed = Self { energy, quadrature, turned, push, rate, ramp, from: began, angle, count, whole };
+        *self = Self::after(from);
+    }
+
     /// One control step: pendulum variables over the set energy, direction now and a step before, the pushes, and the
     /// mechanics in force.
     #[inline]

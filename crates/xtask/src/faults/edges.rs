@@ -195,8 +195,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the phase of a skew stays in the drives",
         "calibrator/src/correction.rs",
-        "        drives.xy.im = zero;\n        drives.yx.im = zero;\n",
-        "        drives.xy.im = zero;\n",
+        "xy: Complex::real((xx * m.xy - m.yy.times(turn)).re),",
+        "xy: xx * m.xy - m.yy.times(turn),",
         CALIBRATOR,
     ),
     fault(

@@ -1230,15 +1230,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the skew of the drives keeps a phase",
         "calibrator/src/correction.rs",
-        "        drives.yx.im = zero;\n",
-        "",
+        "yx: Complex::real((m.xx.times(yx) + yy * m.yx).re),",
+        "yx: m.xx.times(yx) + yy * m.yx,",
         CALIBRATOR,
     ),
     fault(
         "a ratio of the forces is put on X",
         "calibrator/src/correction.rs",
-        "xx: Complex::new(one + scale, phase),",
-        "xx: Complex::new(one + scale + d(Parameter::ForceRatio), phase),",
+        "let xx = Complex::new(scale, phase);",
+        "let xx = Complex::new(scale + d(Parameter::ForceRatio), phase);",
         CALIBRATOR,
     ),
     fault(
