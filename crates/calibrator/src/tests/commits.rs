@@ -5,7 +5,7 @@ use crate::commit::{DECIDE, WEIGH};
 use crate::correction::Correction;
 use crate::parameters::{OTHERS, Parameter as P};
 use crate::record::{BYTES, Refused};
-use crate::state::{Commit, State};
+use crate::state::{Commit, State, Work};
 use crate::ud::{Ud, Update};
 
 /// A filter that took some measurements, so that everything hangs together.
@@ -335,6 +335,34 @@ fn a_split_is_symmetric_and_what_is_not_is_the_detections() {
     for change in unused {
         let s = run(0, change);
         assert_eq!((s.filter.mean, s.schedule.uses_of_symmetry), ([0.0; N], 0));
+    }
+}
+
+/// Whenever in a cycle the split changes: the last slice of a cycle leaves the filter as it is, since its control step hands
+/// over the sums as well.
+#[test]
+fn a_change_of_the_split_is_forgotten_whole_from_every_control_step_on() {
+    let c = Calibrator::<f64>::new(&Settings { steps: 160, ..settings() }).expect("inside its domain");
+    for at in 0..160 {
+        let mut s = due(4);
+        s.schedule.commit = Commit::None;
+        let before = s;
+        c.split_changed(&mut s);
+        s.step = at;
+        while s.schedule.commit == Commit::Forget {
+            let filter = s.filter;
+            c.work(&mut s);
+            assert!(s.step < 159 || s.filter == filter, "{at}");
+            s.step = (s.step + 1) % 160;
+        }
+        assert_eq!(s.step, 0, "{at}: to the end of a cycle");
+        assert!(matches!(s.filter.work, Work::Measure(u) if u == Update::idle()));
+        for j in 0..N {
+            let (mean, variance) =
+                if j < OTHERS { (0.0, 1.0) } else { (before.filter.mean[j], before.filter.ud.variance(j)) };
+            near(s.filter.mean[j], mean, 0.0);
+            near(s.filter.ud.variance(j), variance, 1e-16);
+        }
     }
 }
 

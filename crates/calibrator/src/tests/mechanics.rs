@@ -309,6 +309,10 @@ fn a_new_detection_sees_the_mechanics_and_the_drives_anew() {
 #[test]
 fn what_is_added_is_added_and_what_is_composed_composed() {
     let start = Correction::none(0.04);
+    // a common phase turns skews that are there, and no parameter is theirs
+    let skewed = start.moved(&unit(P::ForceRotation, 0.01)).expect("a device");
+    let turned = skewed.moved(&unit(P::ForcePhase, 0.02)).expect("a device").drives;
+    assert_eq!((turned.xy, turned.yx), (Complex::real(-0.01), Complex::real(0.01)));
     for p in P::ALL {
         let (one, two) = (0.3 * p.expected::<f64>(), 0.2 * p.expected::<f64>());
         let once = start.moved(&unit(p, one)).expect("a device");
