@@ -331,17 +331,8 @@ impl Found {
             decay: None,
             warnings,
         };
-        let provenance = Provenance {
-            tool: Some(Tool::default()),
-            inputs: report.inputs.clone(),
-            amplitude_v: head.amplitude_v,
-            readout_unit: None,
-        };
         report.warnings.extend(left_over(&report.heldout));
-        let mut hypothesis = self.fitted.fit.hypothesis.clone();
-        // what drives can't put out is not undone
-        hypothesis.members.retain(|m| m.id != EffectId::DriveSaturation);
-        let mut calibration = Calibration { device: report.device.clone(), hypothesis, provenance };
+        let mut calibration = self.calibration(&report, head.amplitude_v);
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
             (report.status, report.reason) = (Status::Neutral, Some(reason.clone()));
@@ -351,6 +342,15 @@ impl Found {
         let Self { dataset, fitted, steps, errors, .. } = self;
         let figures = figures(&dataset, Some(&errors.raw), &errors.declared, &errors.discovered, fitted.ring_downs);
         Ok(Identification { report, figures, calibration, steps, plots })
+    }
+
+    fn calibration(&self, report: &Report, amplitude_v: Option<[f64; 2]>) -> Calibration {
+        let (tool, inputs) = (Some(Tool::default()), report.inputs.clone());
+        let provenance = Provenance { tool, inputs, amplitude_v, readout_unit: None };
+        let mut hypothesis = self.fitted.fit.hypothesis.clone();
+        // what drives can't put out is not undone
+        hypothesis.members.retain(|m| m.id != EffectId::DriveSaturation);
+        Calibration { device: report.device.clone(), hypothesis, provenance }
     }
 
     fn context<'a>(&'a self, members: &'a [usize]) -> PlotContext<'a> {
