@@ -29,9 +29,11 @@ const STEPS: usize = 5;
 const CONVERGED: f64 = 0.05;
 /// A run is heard against the others on what it tells at least this share of what all tell together.
 const LEAST_SHARE: f64 = 0.05;
-/// How far Σ of squares may lie above its expectation, or an unknown off a belief, in deviations, before runs or beliefs
-/// are said to disagree: 1 in 100.
+/// How far Σ of squares may lie above its expectation, in deviations, before runs are said to disagree: 1 in 100.
 const DISAGREEMENT: f64 = 2.33;
+/// How far runs and ring-downs may lie apart, in deviations, before either is said to be of another device: 1 in 2,000, since
+/// the interval that covers both may be twenty times as wide.
+const CONTRADICTION: f64 = 3.5;
 
 /// A fit after its last step.
 pub(crate) struct Refined {
@@ -255,7 +257,7 @@ fn contradicted_beliefs(covariance: &mut DMatrix<f64>, normal: &Normal, solution
         let rest = (1.0 - share).max(LEAST_SHARE);
         // (1 − share) of what a belief and runs, whose noise may be larger than it looks, differ by
         let expected = (rest * (rest + share * variance / by_noise) / normal.believed[i]).sqrt();
-        if off.abs() > DISAGREEMENT * expected && share > LEAST_SHARE {
+        if off.abs() > CONTRADICTION * expected && share > LEAST_SHARE {
             let farther = off * (share / rest).max(1.0);
             let along = covariance.column(i) * (farther / variance);
             covariance.ger(1.0, &along, &along, 1.0);
