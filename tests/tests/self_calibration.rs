@@ -236,6 +236,20 @@ fn a_device_at_rest_says_that_it_does_not_know_its_detection() {
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
+/// Loops that settle, and drives of which nothing is known, look like a turn in the first seconds of this device. It was
+/// taken for a ratio of 0.085, five standard deviations from the truth, and made the bias five times larger.
+#[test]
+fn what_looks_like_a_turn_before_anything_is_known_tells_no_detection() {
+    let device = Device::random(900_267);
+    let run = lived::<f32>(&device, 900_267, Life::Rest, 70.0);
+    let bias = |state: &State<f32>, corrected| bias_deg(&device, state, corrected, 500.0, 6.0);
+    let (before, after) = (bias(&run.calibrator.start(), false), bias(&run.state, true));
+    assert!(after < before, "{before} degrees and {after}");
+    let ratio = run.state.estimate(Parameter::DetectionRatio).unwrap();
+    let off = f64::from(ratio.value) - (device.ratio - 1.0);
+    assert!(off.abs() < 3.0 * f64::from(ratio.sigma), "{ratio:?}");
+}
+
 //= specs/self-calibration.md#taken-back
 //= type=test
 //# A commit that predicts what follows worse than the values before it MUST be taken back.

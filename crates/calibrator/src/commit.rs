@@ -273,6 +273,7 @@ impl<T: Float> Calibrator<T> {
     fn begin_anew(&self, s: &mut State<T>) {
         self.split_changed(s);
         s.schedule.forget(N, T::one());
+        s.schedule.cold = true;
     }
 
     /// What was moved leaves the mean, and is on trial where nothing is linearised any more.
@@ -294,6 +295,8 @@ impl<T: Float> Calibrator<T> {
         let (forth, stage) = (sc.commit == Commit::Forth, sc.stage);
         let anew = stage == 0 || sc.angle_used < self.cycles(10);
         match stage {
+            // loops that settle and drives of which nothing is known may have looked like a turn
+            0 if forth && sc.cold => sc.forget(N, T::one()),
             0..3 if forth => sc.forget(OTHERS, if anew { T::one() } else { T::from_f64(0.01) }),
             // to the end of the cycle: the slices that are left would be of no measurement
             _ => sc.forget(0, T::one()),
@@ -301,6 +304,7 @@ impl<T: Float> Calibrator<T> {
         if forth && stage < 4 {
             sc.stage += 1;
             sc.before_rest = 0;
+            sc.cold = false;
         }
         self.resume(s);
     }

@@ -100,6 +100,7 @@ impl<T: Float> Calibrator<T> {
         state.correction = correction;
         state.filter.ud = ud;
         state.schedule.stage = 3;
+        state.schedule.cold = false;
         state.schedule.uses_of_symmetry = u16::from_le_bytes([low, high]);
         state.schedule.angle_used = if scaled == 1 { self.cycles(10) } else { 0 };
         Ok(state)

@@ -89,6 +89,8 @@ pub(crate) struct Schedule<T> {
     pub(crate) refused: u16,
     /// the stage that the first rest interrupted
     pub(crate) before_rest: u8,
+    /// in the first stage, and nothing was told of the detection before it
+    pub(crate) cold: bool,
     /// cycles since rotation told the detection
     pub(crate) untold: u16,
     pub(crate) excited: bool,
@@ -196,6 +198,7 @@ impl<T: Float> Schedule<T> {
             fresh: 0,
             refused: 0,
             before_rest: 0,
+            cold: true,
             untold: u16::MAX,
             excited: false,
             live: false,

@@ -29,6 +29,8 @@ fn two_minutes_of_turning_take_most_of_the_bias_away() {
 struct Outcome {
     reduction: [f64; 2],
     left_deg: f64,
+    /// what ratio and skew would make of an otherwise perfect device, nothing in force
+    alone_deg: f64,
     z: [f64; 3],
     taken_back: u16,
     known: bool,
@@ -46,6 +48,17 @@ fn live<T: Float>(life: Life, seed: u64, seconds: f64, wander: f64) -> Outcome {
     let measured = Device { ratio, skew, wander: 0.0, ..measured };
     let bias = |state: &State<T>, corrected, rate, seconds| bias_deg(&measured, state, corrected, rate, seconds);
     let left_deg = bias(&run.state, true, 500.0, 6.0);
+    let alone = Device {
+        anisodamping: (0.0, 0.0),
+        split: (0.0, 0.0),
+        offset: (0.0, 0.0),
+        cubic: 0.0,
+        phase: (0.0, 0.0),
+        force: (1.0, 1.0),
+        force_skew: 0.0,
+        force_phase: 0.0,
+        ..measured.clone()
+    };
     let reduction = [
         bias(&none, false, 500.0, 6.0) / left_deg,
         bias(&none, false, 60.0, 24.0) / bias(&run.state, true, 60.0, 24.0),
@@ -58,6 +71,7 @@ fn live<T: Float>(life: Life, seed: u64, seconds: f64, wander: f64) -> Outcome {
     Outcome {
         reduction,
         left_deg,
+        alone_deg: bias_deg(&alone, &none, false, 500.0, 6.0),
         z: [
             z(Parameter::DetectionRatio, ratio - 1.0),
             z(Parameter::DetectionSkew, ratio * skew),
@@ -141,6 +155,9 @@ fn print_reductions(life: Life, outcomes: &[Outcome], first: u64) {
             grew.len()
         );
     }
+    let beyond: Vec<u64> =
+        (first..).zip(outcomes).filter(|(_, o)| o.left_deg > 1.01 * o.alone_deg).map(|(n, _)| n).collect();
+    println!("  more left at 500 deg/s than ratio and skew alone make: {} {beyond:?}", beyond.len());
     let held = |i: usize| outcomes.iter().filter(|o| o.z[i].abs() < 1.96).count() as f64 / count as f64;
     let mut left: Vec<f64> = outcomes.iter().map(|o| o.left_deg * 1e3).collect();
     left.sort_by(f64::total_cmp);

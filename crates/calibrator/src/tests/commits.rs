@@ -180,8 +180,10 @@ fn each_stage_commits_what_it_may_and_forgets_as_it_should() {
                 assert_eq!((drives.xx, drives.xy, drives.yx), (drives.yy, Complex::real(0.0), Complex::real(0.0)));
                 assert_eq!(drives.xx.im, 0.0);
             }
-            // of the detection the first two say nothing yet
-            if stage < 2 {
+            // of the detection the first two say nothing yet, and what the very first believes is forgotten
+            if stage == 0 {
+                assert_eq!(after.filter.mean, [0.0; N]);
+            } else if stage < 2 {
                 assert_eq!(after.filter.mean[OTHERS..], before.filter.mean[OTHERS..]);
             }
             assert_eq!(after.schedule.stage, stage + 1);
@@ -190,9 +192,16 @@ fn each_stage_commits_what_it_may_and_forgets_as_it_should() {
                 _ => 1.0,
             };
             near(after.filter.ud.variance(0), variance, 1e-15);
-            near(after.filter.ud.variance(OTHERS), 0.01, 1e-15);
+            near(after.filter.ud.variance(OTHERS), if stage == 0 { 1.0 } else { 0.01 }, 1e-15);
+            assert!(!after.schedule.cold);
         }
     }
+    // what was told before a first stage is kept
+    let mut before = due(0);
+    before.schedule.cold = false;
+    let after = committed(before);
+    assert_eq!(after.filter.mean[OTHERS..], before.filter.mean[OTHERS..]);
+    near(after.filter.ud.variance(OTHERS), before.filter.ud.variance(OTHERS), 1e-15);
     // what is not known to half its expectation is not moved
     for (variance, moves) in [(0.249, true), (0.251, false)] {
         let mut before = due(3);
@@ -229,12 +238,14 @@ fn a_commit_of_the_last_stage_is_on_trial_and_taken_back_as_a_whole() {
 #[test]
 fn a_commit_of_no_device_moves_nothing_and_begins_anew() {
     let mut before = due(3);
+    before.schedule.cold = false;
     before.filter.ud = Ud::diagonal(1e-4);
     before.filter.mean = unit(P::OffsetX, 13.0);
     let after = committed(before);
     assert_eq!(after.correction, before.correction);
     assert_eq!((after.filter.mean, after.filter.ud), ([0.0; N], Ud::diagonal(1.0)));
     assert_eq!((after.schedule.commit, after.schedule.settle, after.schedule.stage), (Commit::None, 37, 0));
+    assert!(!before.schedule.cold && after.schedule.cold, "as after a start");
 }
 
 /// Five times what is expected of devices, in force and believed together, and not a bit more.
@@ -430,6 +441,7 @@ fn a_record_keeps_what_is_in_force_what_is_known_of_the_detection_and_no_more() 
         let back = c.restore(&bytes).expect("whole");
         assert_eq!(back.correction, s.correction);
         assert_eq!((back.schedule.stage, back.schedule.uses_of_symmetry), (3, 0x1234));
+        assert!(!back.schedule.cold, "what it knows of the detection is kept");
         assert_eq!(back.schedule.angle_used, if scaled == 1 { 250 } else { 0 });
         assert_eq!((back.filter.mean, back.schedule.settle), ([0.0; N], 50));
         for i in 0..N {
