@@ -15,8 +15,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a cycle counts its turn from a step too early",
         "calibrator/src/lib.rs",
-        "state.sums = Sums::after(direction);",
-        "state.sums = Sums::after(before);",
+        "state.sums.hand_over(&mut state.closed, direction);",
+        "state.sums.hand_over(&mut state.closed, before);",
         TESTS,
     ),
     fault(

@@ -71,8 +71,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a device may be far from every other",
         "calibrator/src/correction.rs",
-        "&& near(drives.yx, zero, 0.2);\n",
-        ";\n",
+        "&& near(&drives.yx, zero, 0.2)\n",
+        "\n",
         TESTS,
     ),
     fault(
@@ -218,8 +218,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a force rotation pushes X back",
         "calibrator/src/correction.rs",
-        "xy: Complex::real(-turn),",
-        "xy: Complex::real(turn),",
+        "xy: Complex::real((xx * m.xy - m.yy.times(turn)).re),",
+        "xy: Complex::real((xx * m.xy + m.yy.times(turn)).re),",
         TESTS,
     ),
     fault(
