@@ -392,6 +392,17 @@ fn a_matrix_times_its_inverse_changes_nothing() {
     for (got, expected) in back.numbers().into_iter().zip(Matrix::<f64>::identity().numbers()) {
         near(got, expected, 1e-15);
     }
+    // the product does what its right factor does first
+    let first = Matrix { xx: Complex::real(2.0), yx: Complex::new(0.1, 0.3), ..Matrix::identity() };
+    let (x, y) = (Complex::new(0.4, -0.2), Complex::new(-0.6, 0.9));
+    let [(bx, by), (cx, cy)] = [m.times(&first).apply(x, y), {
+        let (x, y) = first.apply(x, y);
+        m.apply(x, y)
+    }];
+    for (got, expected) in [(bx, cx), (by, cy)] {
+        near(got.re, expected.re, 1e-15);
+        near(got.im, expected.im, 1e-15);
+    }
     assert_eq!(Matrix::from_numbers(&m.numbers()), m);
     // a determinant of a thousandth is none
     let flat = |d: f64| Matrix { yy: Complex::real(d), ..Matrix::identity() };

@@ -1743,7 +1743,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "any limit of the outputs is taken",
         "instrument/src/settings.rs",
-        "            (s.dac_limit_v, \"dac_limit_v\"),\n",
+        "            (self.dac_limit_v, \"dac_limit_v\"),\n",
         "",
         OPEN_LOOP,
     ),

@@ -90,8 +90,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "nine tenths exactly are refused",
         "instrument/src/settings.rs",
-        "if s.amplitude_v > 0.9 *",
-        "if s.amplitude_v >= 0.9 *",
+        "if self.amplitude_v > 0.9 *",
+        "if self.amplitude_v >= 0.9 *",
         OPEN_LOOP,
     ),
     fault(
