@@ -10,9 +10,6 @@ use crate::diagnostics::drives::clipping;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::{PlotContext, PlotData};
-use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, ljung_box, reported_harmonics,
-};
 use crate::diagnostics::scale_factor::{gains, scale_factor};
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
@@ -31,10 +28,9 @@ use crate::report::proposals::proposals;
 use crate::report::provenance;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
-use crate::report::unexplained::{described, unexplained};
+use crate::report::unexplained::{described, residual_report, unexplained};
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, ScaleFactor, Status,
-    Temperature, Tool,
+    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool,
 };
 use crate::selection::discovery::discover;
 use crate::selection::last_step::last_step;
@@ -243,15 +239,6 @@ impl Errors {
             noise_floor_deg: self.noise_floor.to_degrees(),
         }
     }
-
-    fn residual(&self) -> ResidualReport {
-        let correlation = autocorrelation(&self.on_fit, WHITENESS_LAGS);
-        let harmonics = |of| reported_harmonics(&self.discovered, of, &self.discovered);
-        ResidualReport {
-            harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
-            white: ljung_box(&correlation, self.on_fit.errors().count()) >= WHITENESS_LEVEL,
-        }
-    }
 }
 
 /// A temperature that lies so far from those that were recorded is another one, K.
@@ -319,7 +306,7 @@ impl Found {
             effects,
             heldout: self.errors.heldout(),
             steps: stages(Some(&self.errors.raw), &self.errors.declared, &self.errors.discovered, &self.steps),
-            residual: self.errors.residual(),
+            residual: residual_report(&self.errors.on_fit, &self.errors.discovered),
             channels: channels_left,
             unexplained,
             runs,

@@ -7,9 +7,7 @@ use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
-use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, inflation, ljung_box, reported_harmonics,
-};
+use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics};
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::residuals::Residual;
@@ -22,9 +20,10 @@ use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::runs::Slope;
 use crate::report::stages::stages;
+use crate::report::unexplained::residual_report;
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, ResidualReport, RunReport, SCHEMA, Share, Status, StepReport,
-    Temperature, Tool, Unexplained,
+    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, Share, Status, StepReport, Temperature, Tool,
+    Unexplained,
 };
 
 /// Errors of a run at one stage, rad.
@@ -143,15 +142,6 @@ impl Evaluated {
         }
     }
 
-    fn residual(&self) -> ResidualReport {
-        let correlation = autocorrelation(&self.on_fit, WHITENESS_LAGS);
-        let harmonics = |of| reported_harmonics(&self.discovered, of, &self.discovered);
-        ResidualReport {
-            harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
-            white: ljung_box(&correlation, self.on_fit.errors().count()) >= WHITENESS_LEVEL,
-        }
-    }
-
     /// Samples that are set aside as spikes, in any of these runs.
     fn spikes(&self, runs: impl Iterator<Item = usize>) -> usize {
         let numbers: std::collections::BTreeSet<usize> = runs.collect();
@@ -205,7 +195,7 @@ pub(crate) fn report(
         effects,
         heldout: errors.heldout(held),
         steps,
-        residual: errors.residual(),
+        residual: residual_report(&errors.on_fit, discovered),
         channels: Vec::new(),
         runs: reported,
         decomposition: finding.decomposition.clone(),

@@ -4,12 +4,12 @@ use cvg_model::effects::{EffectId, harmonic_n};
 
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{
-    Along, Follows, WHITENESS_LAGS, autocorrelation, drift_power, inflation, resolved_harmonics, strongest_harmonics,
-    strongest_line,
+    Along, Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, inflation, ljung_box,
+    reported_harmonics, resolved_harmonics, strongest_harmonics, strongest_line,
 };
 use crate::estimation::joint_fit::Dataset;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
-use crate::report::Unexplained;
+use crate::report::{ResidualReport, Unexplained};
 use crate::selection::step::Step;
 
 /// A line's power over the mean square of the residual, from which it is no accident among those that were looked at:
@@ -24,6 +24,16 @@ const SMALLEST_SHARE: f64 = 0.2;
 const DRIFTS: f64 = 0.4;
 /// The residual may exceed its white part by this factor before "other" is said.
 const LARGEST_EXCESS: f64 = 1.3;
+
+/// What is left after all: its harmonics on the held-out samples, and whether the fitted ones remember anything.
+pub(crate) fn residual_report(on_fit: &Evaluation, held_out: &Evaluation) -> ResidualReport {
+    let harmonics = |of| reported_harmonics(held_out, of, held_out);
+    let memory = autocorrelation(on_fit, WHITENESS_LAGS);
+    ResidualReport {
+        harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
+        white: ljung_box(&memory, on_fit.errors().count()) >= WHITENESS_LEVEL,
+    }
+}
 
 /// What was corrected and not explained.
 pub(crate) fn described(hypothesis: &Hypothesis, steps: &[Step]) -> Vec<Unexplained> {
