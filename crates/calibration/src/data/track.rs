@@ -117,32 +117,27 @@ impl Track {
         let width = (self.t_s.len() / ENOUGH_SAMPLES).min(self.resolved(LARGEST_TURN, speed_rad_s));
         self.stride = 1;
         if width > 1 {
-            let thinned = self.every(width, 0);
-            *self = Self { dense: Some(Box::new(self.every(width, DENSE_SAMPLES))), ..thinned };
+            let thinned = self.kept(usize::MAX, width, width);
+            *self = Self { dense: Some(Box::new(self.kept(DENSE_SAMPLES, 1, width))), ..thinned };
         }
     }
 
-    /// Every sample of the first `dense` of each segment, which are its segment then, and every `width`th of the rest; where
-    /// `dense` is zero a segment is what is left of it.
-    fn every(&self, width: usize, dense: usize) -> Self {
+    /// Every `step`th of the `first` samples of each segment, which are its segment then, and every `width`th of what lies
+    /// between.
+    fn kept(&self, first: usize, step: usize, width: usize) -> Self {
         let (mut rows, mut segments, mut at) = (Vec::new(), Vec::new(), 0);
-        for segment in &self.segments {
-            rows.extend((at..segment.range.start).step_by(width));
+        for Segment { range, role } in &self.segments {
+            rows.extend((at..range.start).step_by(width));
             let start = rows.len();
-            at = segment.range.end.min(segment.range.start + dense);
-            rows.extend(segment.range.start..at);
-            if dense == 0 {
-                rows.extend(segment.range.clone().step_by(width));
-                at = segment.range.end;
-            }
-            segments.push(Segment { range: start..rows.len(), role: segment.role });
+            at = range.end.min(range.start.saturating_add(first));
+            rows.extend((range.start..at).step_by(step));
+            segments.push(Segment { range: start..rows.len(), role: *role });
         }
         rows.extend((at..self.t_s.len()).step_by(width));
         let of =
             |v: &[f64]| -> Vec<f64> { if v.is_empty() { Vec::new() } else { rows.iter().map(|&i| v[i]).collect() } };
         let both = |v: &[Vec<f64>; 2]| [of(&v[0]), of(&v[1])];
-        let width = if dense == 0 { width } else { 1 };
-        let command = |v: &[f64]| -> Vec<f64> { rows.iter().map(|&i| thinned(v, i, width)).collect() };
+        let command = |v: &[f64]| -> Vec<f64> { rows.iter().map(|&i| thinned(v, i, step)).collect() };
         Self {
             name: self.name.clone(),
             file: self.file.clone(),

@@ -429,7 +429,7 @@ impl PlotContext<'_> {
                 let middle = |angle: Vec<f64>| circular_mean(angle.into_iter(), hypothesis.period_rad);
                 let mut start = *start;
                 start.angle += middle(propagated(start, coarse).1);
-                let (turned, mut angle) = propagated(start, Stepping { stride: 1, spike: FAR_OFF_RAD });
+                let (turned, mut angle) = propagated(start, Stepping::without(FAR_OFF_RAD));
                 let centre = middle(angle.clone());
                 for a in &mut angle {
                     *a = wrapped(*a - centre, hypothesis.period_rad);

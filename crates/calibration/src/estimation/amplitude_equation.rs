@@ -59,7 +59,7 @@ pub(crate) fn energy_balance(
     for (p, starts) in tracks.iter().zip(starts) {
         for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
             let (mut origin, mut sum, mut samples) = (None, DVector::zeros(n + 1), 0.0);
-            let stepping = Stepping { stride: 1, spike: p.limit.angle };
+            let stepping = Stepping::without(p.limit.angle);
             propagate(&p.track, segment, hypothesis, &unknowns, *start, stepping, |row| {
                 if row.angle.abs() > stepping.spike {
                     return;

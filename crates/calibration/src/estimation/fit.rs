@@ -441,7 +441,7 @@ pub(crate) fn block_covariance(tracks: &[Prepared], fit: &Fit, role: Role) -> DM
                 let mut angle = Scores::new(n, own);
                 let mut amplitude = Scores::new(n, Own::new(0.0, None));
                 let first = prepared.track.t_s[segment.range.start];
-                let stepping = Stepping { stride: 1, spike: prepared.limit.angle };
+                let stepping = Stepping::without(prepared.limit.angle);
                 propagate(&prepared.track, segment, &fit.hypothesis, &sorted, *start, stepping, |row| {
                     if row.angle.abs() <= prepared.limit.angle {
                         let time = prepared.track.t_s[row.index] - first;

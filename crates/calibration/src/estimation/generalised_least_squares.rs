@@ -86,7 +86,7 @@ impl Problem<'_> {
         let mut columns = vec![0.0; n + 1];
         let first = p.track.t_s[segment.range.start];
         let mut before = None;
-        let stepping = Stepping { stride: 1, spike: p.limit.angle };
+        let stepping = Stepping::without(p.limit.angle);
         propagate(&p.track, segment, &fit.hypothesis, &self.unknowns, fit.starts[t][s], stepping, |row: &Row<'_>| {
             if row.angle.abs() > p.limit.angle {
                 return;

@@ -288,7 +288,7 @@ impl Dataset {
             for (segment, start) in p.track.segments.iter().zip(&p.starts).filter(|(s, _)| s.role == Role::Fit) {
                 let mut last: Option<(f64, [f64; 3])> = None;
                 let (mut sums, mut rows) = ([0.0; 3], Vec::new());
-                let stepping = Stepping { stride: 1, spike: p.limit.angle };
+                let stepping = Stepping::without(p.limit.angle);
                 propagate(&p.track, segment, hypothesis, &none, *start, stepping, |row| {
                     if row.angle.abs() > stepping.spike {
                         return;

@@ -63,6 +63,11 @@ pub(crate) struct Stepping {
 }
 
 impl Stepping {
+    /// Every sample but the spikes.
+    pub(crate) fn without(spike: f64) -> Self {
+        Self { stride: 1, spike }
+    }
+
     /// Every `stride` samples, all believed.
     pub(crate) fn every(stride: usize) -> Self {
         Self { stride, spike: f64::INFINITY }

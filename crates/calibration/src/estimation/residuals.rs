@@ -59,7 +59,7 @@ pub(crate) fn residuals(
                         propagate(track, &segment, hypothesis, &none, start, coarse, |row| angles.push(row.angle));
                         start.angle += circular_mean(angles.into_iter(), hypothesis.period_rad);
                     }
-                    let stepping = Stepping { stride: 1, spike: prepared.limit.angle };
+                    let stepping = Stepping::without(prepared.limit.angle);
                     propagate(track, &segment, hypothesis, &none, start, stepping, |row| r.push(track, row));
                     out.push(r);
                 }

@@ -116,7 +116,7 @@ fn left(dataset: &Dataset, fit: &Fit, closed: &Hypothesis, channels: &[Channel])
             let mut base = Residual::new(number, segment);
             let mut values: Vec<Vec<f64>> = vec![Vec::new(); channels.len()];
             let mut ln_amplitude = 0.0;
-            let stepping = Stepping { stride: 1, spike: p.limit.angle };
+            let stepping = Stepping::without(p.limit.angle);
             propagate(&p.track, segment, closed, &none, *start, stepping, |row| {
                 base.push(&p.track, row);
                 ln_amplitude += row.ln_amplitude;
