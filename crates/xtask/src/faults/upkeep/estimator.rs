@@ -1,0 +1,261 @@
+//! … of the estimator.
+
+use super::{Fault, fault};
+
+const ANGLE: (&str, &str) = ("cvg-estimator", "angle");
+const BEAT: (&str, &str) = ("cvg-estimator", "beat");
+const COMPENSATION: (&str, &str) = ("cvg-estimator", "compensation");
+const DEMODULATOR: (&str, &str) = ("cvg-estimator", "demodulator");
+const DIRECTION: (&str, &str) = ("cvg-estimator", "direction");
+const ESTIMATOR_LIB: (&str, &str) = ("cvg-estimator", "--lib");
+const NCO: (&str, &str) = ("cvg-estimator", "nco");
+const OSCILLATOR: (&str, &str) = ("cvg-estimator", "oscillator");
+const PRECESSION: (&str, &str) = ("cvg-estimator", "precession");
+
+pub(super) const FAULTS: &[Fault] = &[
+    fault(
+        "a parameter of no number is undone",
+        "estimator/src/compensation.rs",
+        "if !(v >= parameter.lower && v <= parameter.upper) {",
+        "if v < parameter.lower || v > parameter.upper {",
+        COMPENSATION,
+    ),
+    fault(
+        "what is left of the effects is undone in the order of the signal",
+        "estimator/src/compensation.rs",
+        "self.effects.iter().take(self.left).rev().flatten()",
+        "self.effects.iter().take(self.left).flatten()",
+        COMPENSATION,
+    ),
+    fault(
+        "of two effects of a kind the second is forgotten",
+        "estimator/src/compensation.rs",
+        "effects.iter().filter(|(e, _)| *e == id)",
+        "effects.iter().filter(|(e, _)| *e == id).take(1)",
+        COMPENSATION,
+    ),
+    fault(
+        "the moment is not asked for where a cubic stands before the others",
+        "estimator/src/compensation.rs",
+        "sorted.left = used.saturating_sub(affine);",
+        "sorted.left = if affine > 0 { 0 } else { used };",
+        COMPENSATION,
+    ),
+    fault(
+        "a sample at the very end of the range is not clipped",
+        "estimator/src/demodulator.rs",
+        "clip_v: T::from_f64(full_scale_v * (1.0 - 1e-4))",
+        "clip_v: T::from_f64(full_scale_v * (1.0 + 1e-4))",
+        DEMODULATOR,
+    ),
+    fault(
+        "a sample exactly where clipping begins is taken unseen",
+        "estimator/src/demodulator.rs",
+        "x.magnitude() < self.clip_v && y.magnitude() < self.clip_v",
+        "x.magnitude() <= self.clip_v && y.magnitude() <= self.clip_v",
+        DEMODULATOR,
+    ),
+    fault(
+        "the longest window is refused",
+        "estimator/src/demodulator.rs",
+        "(8..=10_000).contains(&samples)",
+        "(8..10_000).contains(&samples)",
+        DEMODULATOR,
+    ),
+    fault(
+        "the shortest window is refused",
+        "estimator/src/demodulator.rs",
+        "(8..=10_000).contains(&samples)",
+        "(9..=10_000).contains(&samples)",
+        DEMODULATOR,
+    ),
+    fault(
+        "the end of the range is that at which clipping begins",
+        "estimator/src/demodulator.rs",
+        "if v.within(self.full_scale_v) { v } else { end }",
+        "if v.within(self.full_scale_v) { self.clip_v } else { end }",
+        DEMODULATOR,
+    ),
+    fault(
+        "an envelope may be twice as far out of range",
+        "estimator/src/demodulator.rs",
+        "T::from_f64(8.0 * full_scale_v)",
+        "T::from_f64(16.0 * full_scale_v)",
+        DEMODULATOR,
+    ),
+    fault(
+        "the sine of the next sample is made of the cosine that is already there",
+        "estimator/src/nco.rs",
+        "        let next = self.advanced();\n        (self.cos, self.sin) = (next.cos, next.sin);",
+        "        self.cos = self.advanced().cos;\n        self.sin = self.advanced().sin;",
+        NCO,
+    ),
+    fault(
+        "a correction of exactly a fifth of a radian a sample is taken",
+        "estimator/src/nco.rs",
+        "limit_rad_s * period_s < 0.2)",
+        "limit_rad_s * period_s <= 0.2)",
+        NCO,
+    ),
+    fault(
+        "a bandwidth exactly at what the period can is taken",
+        "estimator/src/oscillator.rs",
+        "if gain * period >= T::one() {",
+        "if gain * period > T::one() {",
+        OSCILLATOR,
+    ),
+    fault(
+        "at its limit a correction has the integral of the window before",
+        "estimator/src/oscillator.rs",
+        "(self.gain_per_s * error + state.detuning_rad_s).bounded",
+        "(self.gain_per_s * error + held).bounded",
+        OSCILLATOR,
+    ),
+    fault(
+        "an infinite energy holds a phase that is undetermined",
+        "estimator/src/oscillator.rs",
+        "if p.e.is_finite() && p.l.is_finite() { Status",
+        "if p.l.is_finite() { Status",
+        OSCILLATOR,
+    ),
+    fault(
+        "a garbage direction leaves the motion before it",
+        "estimator/src/precession.rs",
+        "            state.sin_2_per_window = T::zero();\n            return Movement::Unknown;",
+        "            return Movement::Unknown;",
+        PRECESSION,
+    ),
+    fault(
+        "a direction that is led ahead is always valid",
+        "estimator/src/precession.rs",
+        "sin: d.sin * length + d.cos * psi, status: d.status }",
+        "sin: d.sin * length + d.cos * psi, status: crate::Status::Valid }",
+        PRECESSION,
+    ),
+    fault(
+        "no lead is refused",
+        "estimator/src/precession.rs",
+        "if !(lead_s >= 0.0 && lead_s",
+        "if !(lead_s > 0.0 && lead_s",
+        PRECESSION,
+    ),
+    fault(
+        "a smoothing of exactly a window is refused",
+        "estimator/src/precession.rs",
+        "if !(smoothing_s >= window_s &&",
+        "if !(smoothing_s > window_s &&",
+        PRECESSION,
+    ),
+    fault(
+        "the lead is that of single precision times a second",
+        "estimator/src/precession.rs",
+        "half_lead: T::from_f64(0.5 * lead_s / window_s)",
+        "half_lead: T::from_f64(0.5 * lead_s / smoothing_s)",
+        PRECESSION,
+    ),
+    fault(
+        "a steady motion is smoothed from nothing",
+        "estimator/src/precession.rs",
+        "self.sin_2_per_window + share * (across - self.sin_2_per_window)",
+        "share * across",
+        PRECESSION,
+    ),
+    fault(
+        "an in-phase part whose square vanishes has a sense",
+        "estimator/src/direction.rs",
+        "length_2 <= T::ratio(8, 1) && in_phase * in_phase > T::zero()",
+        "length_2 <= T::ratio(8, 1) && in_phase != T::zero()",
+        DIRECTION,
+    ),
+    fault(
+        "squares that were rounded away make a direction",
+        "estimator/src/direction.rs",
+        "length_2 > T::zero() && !lost &&",
+        "length_2 > T::zero() && !(lost && cos == T::zero()) &&",
+        DIRECTION,
+    ),
+    fault(
+        "a tracker without a least vibration is refused",
+        "estimator/src/angle.rs",
+        "if least_v >= T::zero() && least_v.is_finite()",
+        "if least_v > T::zero() && least_v.is_finite()",
+        ANGLE,
+    ),
+    fault(
+        "a sensor of full turns is read as a pattern",
+        "estimator/src/angle.rs",
+        "Self::FullTurn => T::PI,",
+        "Self::FullTurn => T::PI * T::half(),",
+        ANGLE,
+    ),
+    fault(
+        "the end of the windows starts anew",
+        "estimator/src/beat.rs",
+        "self.windows = self.windows.saturating_add(1);",
+        "self.windows = self.windows.wrapping_add(1);",
+        ESTIMATOR_LIB,
+    ),
+    fault(
+        "what beats along in Y counts its quadrature backwards",
+        "estimator/src/beat.rs",
+        "(e.y_c * l.y_c + e.y_s * l.y_s);",
+        "(e.y_c * l.y_c - e.y_s * l.y_s);",
+        BEAT,
+    ),
+    fault(
+        "a phase of no number is handed on",
+        "estimator/src/beat.rs",
+        "if cos.is_finite() && sin.is_finite() { (cos, sin) }",
+        "if !(cos.is_finite() && !sin.is_finite()) { (cos, sin) }",
+        BEAT,
+    ),
+    fault(
+        "the sine of a correction has its fifth order too large",
+        "estimator/src/nco.rs",
+        "T::ratio(1, 120)",
+        "T::ratio(1, 100)",
+        NCO,
+    ),
+    fault(
+        "a mean is that of a sample less",
+        "estimator/src/demodulator.rs",
+        "T::from_f64(0.5 / f64::from(samples))",
+        "T::from_f64(0.5 / (f64::from(samples) - 1.0))",
+        DEMODULATOR,
+    ),
+    fault(
+        "what is invalid is told as clipped",
+        "estimator/src/demodulator.rs",
+        "Measurement { envelope, fingerprint, status, invalid, clipped }",
+        "Measurement { envelope, fingerprint, status, invalid: clipped, clipped: invalid }",
+        DEMODULATOR,
+    ),
+    fault(
+        "an effect of the drives is undone in the readout",
+        "estimator/src/compensation.rs",
+        "if description.stage != Stage::Readout || !id.in_library() {",
+        "if description.stage == Stage::Input || !id.in_library() {",
+        COMPENSATION,
+    ),
+    fault(
+        "the last parameter of an effect may be anything",
+        "estimator/src/compensation.rs",
+        "for (value, parameter) in values.iter().zip(description.parameters) {",
+        "for (value, parameter) in values.iter().zip(description.parameters).take(1) {",
+        COMPENSATION,
+    ),
+    fault(
+        "the inverse has the offset of X in Y",
+        "estimator/src/compensation.rs",
+        "y: t(offset.y_c) }",
+        "y: t(offset.x_c) }",
+        COMPENSATION,
+    ),
+    fault(
+        "a full turn is told by the quadrature of Y",
+        "estimator/src/angle.rs",
+        "e.x_c * e.x_c + e.y_c * e.y_c)",
+        "e.x_c * e.x_c + e.y_s * e.y_s)",
+        ANGLE,
+    ),
+];
