@@ -8,6 +8,7 @@ mod commits;
 mod cycles;
 mod mechanics;
 mod precision;
+mod schedule;
 mod sums;
 
 use cvg_model::Envelope;

@@ -30,6 +30,16 @@ pub(crate) fn cvg<A: AsRef<OsStr>>(arguments: &[A]) -> Outcome {
     }
 }
 
+/// The same with arguments of different types.
+pub(crate) fn run(arguments: &[&dyn AsRef<OsStr>]) -> Outcome {
+    cvg(arguments)
+}
+
+/// A value of a report and the ends of its interval.
+pub(crate) fn estimate(v: &Value) -> [f64; 3] {
+    [&v["value"], &v["ci95"][0], &v["ci95"][1]].map(|v| v.as_f64().unwrap())
+}
+
 /// Runs `cvg`, which has to succeed, and gives what it printed.
 pub(crate) fn cvg_ok<A: AsRef<OsStr> + std::fmt::Debug>(arguments: &[A]) -> String {
     let outcome = cvg(arguments);
