@@ -183,6 +183,7 @@ fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result
     let scale_factor = scale_factor(&gains(&mut dataset, &fitted));
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
+    let steps = steps.into_iter().map(|step| step.read(&dataset)).collect();
     let warnings = std::mem::take(&mut dataset.warnings);
     let drives = dataset.clipping.and_then(|_| clipping(&dataset, &fitted.fit.hypothesis)?.report());
     let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors, drives };

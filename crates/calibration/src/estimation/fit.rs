@@ -313,8 +313,21 @@ pub(super) fn collect(
     hypothesis: &Hypothesis,
     unknowns: &Unknowns,
     role: Role,
-    (stride, widened): (usize, f64),
+    thinned: (usize, f64),
 ) -> Vec<Sums> {
+    collect_folds(prepared, starts, hypothesis, unknowns, role, thinned, 1).into_iter().flatten().collect()
+}
+
+/// [`collect`], with every segment cut into `folds` stretches of equally many samples.
+pub(super) fn collect_folds(
+    prepared: &Prepared,
+    starts: &[Start],
+    hypothesis: &Hypothesis,
+    unknowns: &Unknowns,
+    role: Role,
+    (stride, widened): (usize, f64),
+    folds: usize,
+) -> Vec<Vec<Sums>> {
     let Prepared { track, noise, .. } = prepared;
     let limit = Noise { angle: widened * prepared.limit.angle, amplitude: widened * prepared.limit.amplitude };
     let weights = [noise.angle.powi(-2), noise.amplitude.powi(-2)].map(|w| w * stride as f64);
@@ -324,12 +337,13 @@ pub(super) fn collect(
         .zip(starts)
         .map(|(segment, start)| {
             let own = own(prepared, segment, hypothesis, unknowns);
-            let mut sums = Sums::new(unknowns.all.len(), *start, own);
+            let mut sums: Vec<Sums> = (0..folds).map(|_| Sums::new(unknowns.all.len(), *start, own)).collect();
             let mut slopes = vec![0.0; unknowns.all.len()];
             let first = track.t_s[segment.range.start];
             if segment.role == role {
                 let stepping = Stepping { stride, spike: limit.angle };
                 propagate(track, segment, hypothesis, unknowns, *start, stepping, |row| {
+                    let sums = &mut sums[(row.index - segment.range.start) * folds / segment.range.len()];
                     if row.angle.abs() <= limit.angle && (weights[1] == 0.0 || row.amplitude.abs() <= limit.amplitude) {
                         let time = track.t_s[row.index] - first;
                         slopes.copy_from_slice(row.angle_slopes);

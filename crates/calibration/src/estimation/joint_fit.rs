@@ -109,7 +109,7 @@ impl Dataset {
         let mut prepared = Vec::new();
         let mut gains = Vec::new();
         for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
-            gains.push((motion.angular_gain, motion.travel.powi(2) * track.t_s.len() as f64));
+            gains.push((motion.angular_gain, motion.travel.powi(2) * track.samples(Role::Fit) as f64));
             prepared.push(prepared_run(track, motion, instrument));
         }
         if prepared.iter().all(|p| p.track.samples(Role::Fit) == 0) {
@@ -415,17 +415,22 @@ fn prepared_run(track: Track, motion: Motion, instrument: Instrument) -> Prepare
     Prepared { noise, white: noise, limit, starts: motion.starts, drifts, track }
 }
 
-/// Mean temperature of what is fitted, °C, where one was recorded.
+/// The tracks of which some samples are fitted.
+fn fitted_tracks(tracks: &[Prepared]) -> impl Iterator<Item = &Track> {
+    tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0)
+}
+
+/// Mean temperature of the runs that are fitted, °C, where one was recorded.
 fn mean_temperature(tracks: &[Prepared]) -> Option<f64> {
-    let all = || tracks.iter().flat_map(|p| p.track.temperatures_c());
+    let all = || fitted_tracks(tracks).flat_map(Track::temperatures_c);
     let count = all().count();
     (count > 0).then(|| all().sum::<f64>() / count as f64)
 }
 
-/// rms of the energy and the quadrature command per unit of amplitude over all tracks, V/V.
+/// rms of the energy and the quadrature command per unit of amplitude over the runs that are fitted, V/V.
 fn command_rms(tracks: &[Prepared]) -> [f64; 2] {
     let (mut n, mut squares) = (0.0, [0.0; 2]);
-    for track in tracks.iter().map(|p| &p.track) {
+    for track in fitted_tracks(tracks) {
         for i in (0..track.t_s.len()).step_by((track.t_s.len() / 2000).max(1)) {
             let e = track.envelope(i).pendulum().e;
             if let Some(v) = track.commands(i, 1).filter(|_| e > 0.0) {

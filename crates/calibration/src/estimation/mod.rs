@@ -5,6 +5,7 @@ pub(crate) mod amplitude_equation;
 pub mod bias;
 pub(crate) mod coloured_noise;
 pub(crate) mod contrasts;
+pub(crate) mod cross_validation;
 pub(crate) mod fit;
 pub(crate) mod generalised_least_squares;
 pub mod identifiability;

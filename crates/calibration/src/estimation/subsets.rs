@@ -48,7 +48,7 @@ impl Superset {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::data::track::Track;
     use crate::estimation::fit::{Effort, Noise, fit};
@@ -57,9 +57,9 @@ mod tests {
     use crate::recording::{Instrument, Recording, Run, RunKind};
     use cvg_model::effects::EffectId;
 
-    /// A pattern that turns at 5 rad/s, read with a gain of Y, a skew and a cubic.
-    fn track() -> Track {
-        let t_s: Vec<f64> = (0..400).map(|i| 0.01 * f64::from(i)).collect();
+    /// Samples of a pattern that turns at 5 rad/s, read with a gain of Y, a skew and a cubic.
+    pub(in crate::estimation) fn turning(samples: std::ops::Range<usize>) -> Track {
+        let t_s: Vec<f64> = samples.map(|i| 0.01 * i as f64).collect();
         let read = |f: fn(f64) -> f64| Some(t_s.iter().map(|t| f(-5.0 * t)).collect::<Vec<f64>>());
         let recording = Recording {
             xc_v: read(|theta| theta.cos() + 2e-3 * theta.cos().powi(3)),
@@ -79,7 +79,7 @@ mod tests {
     fn what_a_model_would_leave_is_what_one_step_of_its_own_fit_leaves() {
         let noise = Noise { angle: 1e-4, amplitude: f64::INFINITY };
         let limit = Noise { angle: 1.0, amplitude: f64::INFINITY };
-        let (track, starts) = (track(), vec![Start::default()]);
+        let (track, starts) = (turning(0..400), vec![Start::default()]);
         let tracks = [Prepared { track, noise, white: noise, starts, drifts: false, limit }];
         let mut all = Hypothesis::ideal(Instrument::Gyroscope, std::f64::consts::PI, 0.8);
         let effects = [EffectId::DetectionGainMismatch, EffectId::DetectionSkew, EffectId::DetectionCubic];

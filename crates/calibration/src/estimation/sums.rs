@@ -56,6 +56,7 @@ impl Own {
 
 /// Weighted sums of one segment: Σ w v vᵀ with v = (1, time, slopes …, residual), for angle and amplitude apart. Slopes are
 /// reduced as [`Own`] says.
+#[derive(Clone)]
 pub(crate) struct Sums {
     n: usize,
     pub(crate) angle: Vec<f64>,
@@ -66,11 +67,54 @@ pub(crate) struct Sums {
     start: Start,
 }
 
+/// Weighted residuals of one segment against its bias and its slope in time.
+pub(crate) struct Left {
+    /// Σ w (1, t)ᵀ(1, t)
+    pub(crate) own: Matrix2<f64>,
+    /// Σ w r (1, t)
+    pub(crate) products: Vector2<f64>,
+    /// Σ w r²
+    pub(crate) squares: f64,
+}
+
 impl Sums {
     /// Empty sums for `n` unknowns on a segment that starts at `start`.
     pub(crate) fn new(n: usize, start: Start, own: Own) -> Self {
         let size = (n + 3) * (n + 4) / 2;
         Self { n, angle: vec![0.0; size], amplitude: vec![0.0; size], counted: [0; 2], set_aside: 0, own, start }
+    }
+
+    /// The sums of several stretches of a segment; none of no stretch.
+    pub(crate) fn total<'a>(parts: impl Iterator<Item = &'a Self>) -> Option<Self> {
+        parts.fold(None, |total: Option<Self>, part| {
+            let Some(mut total) = total else { return Some(part.clone()) };
+            let both = |into: &mut [f64], from: &[f64]| into.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+            both(&mut total.angle, &part.angle);
+            both(&mut total.amplitude, &part.amplitude);
+            total.counted = std::array::from_fn(|i| total.counted[i] + part.counted[i]);
+            total.set_aside += part.set_aside;
+            Some(total)
+        })
+    }
+
+    /// What a step of the unknowns would leave of the angle, to first order, before its bias and its slope are taken out.
+    pub(crate) fn after(&self, step: &DVector<f64>) -> Left {
+        let n = self.n;
+        // the slope that was reduced goes with the time
+        let timed = -(0..n).map(|i| self.own.per_s(i) * step[i]).sum::<f64>();
+        let shares = |i: usize| match i {
+            0 => 0.0,
+            1 => timed,
+            i if i < n + 2 => -step[i - 2],
+            _ => 1.0,
+        };
+        let row = |i: usize| (0..n + 3).map(|j| Self::element(&self.angle, i, j) * shares(j)).sum::<f64>();
+        let [w, wt, wtt] = [self.angle[0], self.angle[1], self.angle[2]];
+        Left {
+            own: Matrix2::new(w, wt, wt, wtt),
+            products: Vector2::new(row(0), row(1)),
+            squares: (0..n + 3).map(|i| shares(i) * row(i)).sum(),
+        }
     }
 
     pub(crate) fn add(packed: &mut [f64], weight: f64, time: f64, slopes: &[f64], residual: f64) {

@@ -6,9 +6,7 @@
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, autocorrelation, inflation, pattern_harmonics, strongest_harmonics,
-};
+use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
@@ -16,8 +14,8 @@ use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;
-use crate::selection::step::{Step, member_of};
-use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, heldout, on_heldout, restore};
+use crate::selection::step::{Accepted, State, member_of};
+use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, restore, validated};
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
 const TOLERATED_SHARE: f64 = 0.15;
@@ -25,7 +23,7 @@ const TOLERATED_SHARE: f64 = 0.15;
 const TOLERATED_DEVIATIONS: f64 = 5.0;
 /// A harmonic without a cause at least this large beside an effect at the same harmonic makes one cause of both likelier.
 const SHARED_HARMONIC: f64 = 0.1;
-/// What a cause does to the held-out angle, beside the error that is left there.
+/// What a cause does to the angle, beside the error that is left there.
 const SMALLEST_CLAIM: f64 = 0.3;
 /// An effect is at one harmonic when that carries this share of its power.
 const AT_ONE_HARMONIC: f64 = 0.5;
@@ -37,7 +35,7 @@ struct Share {
     deviation: f64,
 }
 
-/// What an effect does to the angle, in the runs of one role.
+/// What an effect does to the angle of the fitted runs.
 struct Contribution {
     with: Evaluation,
     /// the angle without the effect less that with it
@@ -45,11 +43,11 @@ struct Contribution {
 }
 
 impl Contribution {
-    fn new(dataset: &Dataset, fit: &Fit, member: usize, role: Role) -> Self {
-        let with = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole, None);
+    fn new(dataset: &Dataset, fit: &Fit, member: usize) -> Self {
+        let with = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None);
         let mut reduced = fit.hypothesis.clone();
         reduced.members.remove(member);
-        let mut change = evaluate(&dataset.tracks, &reduced, &fit.starts, role, Window::Whole, Some(&with));
+        let mut change = evaluate(&dataset.tracks, &reduced, &fit.starts, Role::Fit, Window::Whole, Some(&with));
         for (without, with) in change.segments.iter_mut().zip(&with.segments) {
             for (a, b) in without.angle.iter_mut().zip(&with.angle) {
                 *a -= b;
@@ -103,7 +101,7 @@ impl Contribution {
 ///
 /// # Errors
 /// As for the fit.
-pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
+pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Accepted]) -> Result<(), Refusal> {
     for own in 0..steps.len() {
         let Some(at) = member_of(&fitted.fit.hypothesis, own, steps) else { continue };
         if fitted.fit.hypothesis.members[at].origin != Origin::Discovered {
@@ -127,27 +125,23 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
 }
 
 /// A step with the one rival that took its place as the cause.
-pub(super) fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Step) -> Step {
-    let after = on_heldout(dataset, fit);
-    let rms = after.mean_square().sqrt().to_degrees();
+pub(super) fn in_its_place(dataset: &Dataset, fit: &Fit, id: EffectId, step: &Accepted) -> Accepted {
     let balance = balance(dataset, fit).map(f64::sqrt);
-    Step {
+    Accepted {
         id,
         origin: Origin::Discovered,
         confounded_with: Vec::new(),
         gain: step.rivals.iter().find(|r| r.0 == id).map_or(step.gain, |r| r.1),
         rivals: step.rivals.iter().filter(|r| r.0 != id).copied().collect(),
-        heldout_rms_deg: [step.heldout_rms_deg[0], rms],
-        heldout: after.size(),
-        harmonics: pattern_harmonics(&after),
+        states: [step.states[0].clone(), State::of(fit)],
         energy_balance: step.energy_balance.zip(balance).map(|([before, _], after)| [before, after]),
         ..step.clone()
     }
 }
 
-/// Whether a fit leaves no more of the held-out samples than another.
-fn leaves_no_more(dataset: &Dataset, fit: &Fit, other: &Fit) -> bool {
-    heldout(dataset, fit) <= heldout(dataset, other)
+/// Whether a fit leaves no more than another under cross-validation.
+fn leaves_no_more(dataset: &Dataset, fitted: &Fitted, other: &Fitted) -> bool {
+    validated(dataset, fitted) <= validated(dataset, other)
 }
 
 /// The one rival of a member that every run bears out, fitted in its place, where it explains the samples as is asked for.
@@ -156,8 +150,8 @@ pub(super) fn rival_that_explains(
     dataset: &mut Dataset,
     fitted: &Fitted,
     at: usize,
-    step: &Step,
-    explains: impl Fn(&Dataset, &Fit, &Fit) -> bool,
+    step: &Accepted,
+    explains: impl Fn(&Dataset, &Fitted, &Fitted) -> bool,
 ) -> Result<Option<(EffectId, Fitted)>, Refusal> {
     let apart = Distinguishable::on(dataset);
     let mut found = None;
@@ -171,7 +165,7 @@ pub(super) fn rival_that_explains(
         hypothesis.members.remove(at);
         let place = hypothesis.admit(*id, Origin::Discovered);
         let next = fit_with_ring_downs(dataset, &hypothesis)?;
-        let borne_out = explains(dataset, &next.fit, &fitted.fit) && inconsistency(dataset, &next.fit, place).is_none();
+        let borne_out = explains(dataset, &next, fitted) && inconsistency(dataset, &next.fit, place).is_none();
         if borne_out && found.replace((*id, next)).is_some() {
             found = None;
             break;
@@ -182,30 +176,24 @@ pub(super) fn rival_that_explains(
 
 /// Why member `member` cannot be claimed as a cause, if the runs contradict it.
 fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> {
-    for role in [Role::Fit, Role::Holdout] {
-        let contribution = Contribution::new(dataset, fit, member, role);
-        if role == Role::Holdout && contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {
-            return Some("it does too little on held-out data to be recognised".into());
-        }
-        let contradicting = contribution
-            .shares(dataset)
-            .into_iter()
-            .find(|s| (s.value - 1.0).abs() > TOLERATED_SHARE + TOLERATED_DEVIATIONS * s.deviation);
-        if let Some(s) = contradicting {
-            return Some(format!("{} shows {:.2} ± {:.2} of it", s.run, s.value, s.deviation));
-        }
-        let harmonic = contribution.harmonic().filter(|_| role == Role::Fit);
-        let beside = fit.hypothesis.members.iter().enumerate().find(|(_, m)| {
-            m.origin == Origin::Empirical
-                && m.id == EffectId::HarmonicN
-                && harmonic.is_some_and(|n| (m.values[0] - f64::from(n)).abs() < 0.5)
-        });
-        if let Some((other, m)) = beside {
-            let size = Contribution::new(dataset, fit, other, role).rms();
-            if size > SHARED_HARMONIC * contribution.rms() {
-                return Some(format!("another part of harmonic {} has no known cause", m.values[0]));
-            }
-        }
+    let contribution = Contribution::new(dataset, fit, member);
+    if contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {
+        return Some("it does too little to be recognised".into());
     }
-    None
+    let contradicting = contribution
+        .shares(dataset)
+        .into_iter()
+        .find(|s| (s.value - 1.0).abs() > TOLERATED_SHARE + TOLERATED_DEVIATIONS * s.deviation);
+    if let Some(s) = contradicting {
+        return Some(format!("{} shows {:.2} ± {:.2} of it", s.run, s.value, s.deviation));
+    }
+    let harmonic = contribution.harmonic();
+    let (other, m) = fit.hypothesis.members.iter().enumerate().find(|(_, m)| {
+        m.origin == Origin::Empirical
+            && m.id == EffectId::HarmonicN
+            && harmonic.is_some_and(|n| (m.values[0] - f64::from(n)).abs() < 0.5)
+    })?;
+    let size = Contribution::new(dataset, fit, other).rms();
+    (size > SHARED_HARMONIC * contribution.rms())
+        .then(|| format!("another part of harmonic {} has no known cause", m.values[0]))
 }

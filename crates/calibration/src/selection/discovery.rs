@@ -2,14 +2,13 @@
 //!
 //! Candidates compete by refitting the whole model with each of them, on all runs at once; what a candidate gains in
 //! likelihood is set against its parameters and against how many candidates were tried. The winner must also lower the
-//! error on data that was not fitted. Effects come in one at a time; weak ones are dropped again. Where two causes of
+//! error of blocked cross-validation; the held-out runs are not seen here. Effects come in one at a time; weak ones are dropped again. Where two causes of
 //! the library explain a residual equally well, neither is claimed: an empirical harmonic stands in for both.
 
 use cvg_model::effects::{EffectId, Stage};
 use rayon::prelude::*;
 
 use crate::diagnostics::evaluate::evaluate;
-use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
@@ -19,12 +18,12 @@ use crate::recording::Role;
 use crate::selection::candidates::candidates;
 use crate::selection::consistency::{ask_every_run, in_its_place, rival_that_explains};
 use crate::selection::pairs::best_pair;
-use crate::selection::step::{Step, member_of, step_of};
+use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
-    Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_HELDOUT_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK,
-    REFUTED, Trial, balance, count, extend, extend_from, heldout, mean_square, on_heldout, price, refit, restore,
-    sample_cost,
+    Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN, NOTHING_LEFT, QUICK,
+    REFUTED, Trial, balance, count, extend, extend_from, mean_square, on_fit, price, refit, restore, sample_cost,
+    validated,
 };
 
 /// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
@@ -40,8 +39,8 @@ pub(crate) fn discover(
     dataset: &mut Dataset,
     mut fitted: Fitted,
     progress: &dyn Fn(&str),
-) -> Result<(Fitted, Vec<Step>), Refusal> {
-    let mut steps: Vec<Step> = Vec::new();
+) -> Result<(Fitted, Vec<Accepted>), Refusal> {
+    let mut steps: Vec<Accepted> = Vec::new();
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
         if let Some((next, step)) = best_step(dataset, &fitted)? {
@@ -67,8 +66,8 @@ pub(crate) fn discover(
 }
 
 /// What stands without a cause is put on trial again beside all that came in after it: a cause that a larger effect hid
-/// takes its place where it leaves no more of the data that was not fitted.
-fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) -> Result<(), Refusal> {
+/// takes its place where it leaves no more under cross-validation.
+fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Accepted]) -> Result<(), Refusal> {
     if steps.len() < 2 {
         // beside nothing else the trial would be the one that it had
         return Ok(());
@@ -86,10 +85,10 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
         }
         let mut without = fitted.fit.hypothesis.clone();
         without.members.remove(at);
-        let left = heldout(dataset, &fitted.fit);
+        let left = validated(dataset, fitted);
         let without = fit_with_ring_downs(dataset, &without)?;
         match best_step(dataset, &without)? {
-            Some((next, step)) if step.origin == Origin::Discovered && heldout(dataset, &next.fit) <= left => {
+            Some((next, step)) if step.origin == Origin::Discovered && validated(dataset, &next) <= left => {
                 *fitted = next;
                 steps[own] = step;
             }
@@ -99,23 +98,22 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Step]) ->
     Ok(())
 }
 
-/// Whether a fit explains the fitted samples no worse than another by what tells rivals apart, and the held-out ones within a
-/// standard error of their mean square, and the energy balance does not refute it.
-fn explains_as_well(dataset: &Dataset, fit: &Fit, other: &Fit) -> bool {
-    let balances = balance(dataset, other).zip(balance(dataset, fit));
+/// Whether a fit explains the fitted samples no worse than another by what tells rivals apart, and under cross-validation within
+/// a standard error of their mean square, and the energy balance does not refute it.
+fn explains_as_well(dataset: &Dataset, fitted: &Fitted, other: &Fitted) -> bool {
+    let balances = balance(dataset, &other.fit).zip(balance(dataset, &fitted.fit));
     if balances.is_some_and(|(before, after)| after > REFUTED * before) {
         return false;
     }
-    let [left, before] = [fit, other].map(|f| on_heldout(dataset, f));
-    let cost = sample_cost(&before);
-    let held_out = before.errors().count().max(1) as f64 / cost;
-    let lead = count(fit) / cost * (mean_square(fit) / mean_square(other)).ln();
-    lead < LEAST_LEAD && left.mean_square() <= (1.0 + (2.0 / held_out).sqrt()) * before.mean_square()
+    let worth = count(&fitted.fit) / sample_cost(&on_fit(dataset, &other.fit));
+    let lead = worth * (mean_square(&fitted.fit) / mean_square(&other.fit)).ln();
+    let allowed = 1.0 + (2.0 / worth.max(1.0)).sqrt();
+    lead < LEAST_LEAD && validated(dataset, fitted) <= allowed * validated(dataset, other)
 }
 
 /// The best extension of a fitted hypothesis that earns its place.
-fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Step)>, Refusal> {
-    let before = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Accepted)>, Refusal> {
+    let before = on_fit(dataset, &fitted.fit);
     let dense =
         dataset.tracks.iter().any(|p| p.track.is_thinned()).then(|| {
             evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
@@ -143,27 +141,23 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, S
     }
     let apart = Distinguishable::on(dataset);
     let balance_before = balance(dataset, &base);
-    let before_it = Before::of(dataset, &fitted.fit);
+    let before_it = Before::of(dataset, fitted);
     loop {
         amplitude_evidence(dataset, &mut trials, balance_before, apart);
         let Some((chosen, origin, confounded_with)) = choose(&trials, apart) else { return Ok(None) };
         let chosen = chosen.clone();
         let next = fit_with_ring_downs(dataset, &extend_from(&chosen, origin))?;
-        let after = on_heldout(dataset, &next.fit);
-        let heldout_after = after.mean_square();
         trials.retain(|t| t.candidate != chosen.candidate);
-        if !before_it.is_improved_by(heldout_after) {
-            // gained on the fitted data only, or too little to name: the next one's turn
+        if !before_it.is_improved_by(validated(dataset, &next)) {
+            // gained where it was fitted only, or too little to name: the next one's turn
             continue;
         }
-        let step = Step {
+        let step = Accepted {
             id: chosen.candidate.id,
             origin,
             gain: chosen.gain,
             rivals: trials.iter().map(|t| (t.candidate.id, t.gain)).take(3).collect(),
-            heldout_rms_deg: [before_it.mean_square, heldout_after].map(|square| square.sqrt().to_degrees()),
-            heldout: after.size(),
-            harmonics: pattern_harmonics(&after),
+            states: [&fitted.fit, &next.fit].map(State::of),
             confounded_with,
             energy_balance: balance_before.zip(chosen.balance).map(|(a, b)| [a.sqrt(), b.sqrt()]),
             inconsistency: chosen.refuted.then(|| "the energy balance contradicts it".to_owned()),
@@ -182,8 +176,7 @@ fn tried_carefully(dataset: &Dataset, fitted: &Fitted, quick: &[Trial], base: &F
         return trials;
     };
     // Autocorrelation that even the best candidate leaves makes samples worth less.
-    let after = evaluate(&dataset.tracks, &best.fit.hypothesis, &best.fit.starts, Role::Fit, Window::Whole, None);
-    let worth = 1.0 / sample_cost(&after);
+    let worth = 1.0 / sample_cost(&on_fit(dataset, &best.fit));
     for t in &mut trials {
         let n = worth * count(&t.fit);
         t.gain = n * (mean_square(base) / mean_square(&t.fit)).ln() - price(&t.candidate, n);
@@ -242,21 +235,13 @@ fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, V
 }
 
 /// Drops effects whose place the final data does not support.
-pub(super) fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Step>) -> Result<(), Refusal> {
+pub(super) fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Accepted>) -> Result<(), Refusal> {
     if steps.len() < 2 {
         return Ok(());
     }
     loop {
         let with = refit(dataset, fitted, &fitted.fit.hypothesis, CAREFUL);
-        let worth = 1.0
-            / sample_cost(&evaluate(
-                &dataset.tracks,
-                &fitted.fit.hypothesis,
-                &fitted.fit.starts,
-                Role::Fit,
-                Window::Whole,
-                None,
-            ));
+        let worth = 1.0 / sample_cost(&on_fit(dataset, &fitted.fit));
         let n = worth * count(&with);
         let weakest = (0..fitted.fit.hypothesis.members.len())
             .filter(|&i| steps.iter().any(|s| s.id == fitted.fit.hypothesis.members[i].id))
@@ -273,10 +258,10 @@ pub(super) fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut 
                 let step = step_of(&fitted.fit.hypothesis, i, steps);
                 let mut reduced = fitted.fit.hypothesis.clone();
                 reduced.members.remove(i);
-                let before = heldout(dataset, &fitted.fit);
+                let before = validated(dataset, fitted);
                 let without = fit_with_ring_downs(dataset, &reduced)?;
-                if (1.0 - LEAST_HELDOUT_GAIN) * heldout(dataset, &without.fit) > before {
-                    // weak by itself, but the data that was not fitted asks for it
+                if (1.0 - LEAST_VALIDATED_GAIN) * validated(dataset, &without) > before {
+                    // weak by itself, but what it leaves where it was not fitted asks for it
                     *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
                     return Ok(());
                 }

@@ -11,11 +11,11 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::{Instrument, Role};
-use crate::selection::step::{Step, step_of};
+use crate::selection::step::{Accepted, step_of};
 use crate::selection::trial::LEAST_GAIN;
 use cvg_model::effects::Role as ParameterRole;
 
-/// A last step that leaves more than this many times the mean square of held-back data is not made: it is linear, and
+/// A last step that leaves more than this many times the mean square is not made: it is linear, and
 /// what it moves was not.
 const WORSE: f64 = 1.1;
 
@@ -27,7 +27,7 @@ const WORSE: f64 = 1.1;
 pub(crate) fn last_step(
     dataset: &mut Dataset,
     fitted: &mut Fitted,
-    steps: &mut Vec<Step>,
+    steps: &mut Vec<Accepted>,
 ) -> Result<DMatrix<f64>, Refusal> {
     if dataset.instrument == Instrument::Sensor {
         // the amplitude is part of a sensor's fit
@@ -69,7 +69,7 @@ fn refined(dataset: &mut Dataset, fitted: &Fitted) -> Option<Refined> {
 
 /// The least significant member that discovery added, and its step, where coloured noise and the runs' disagreement
 /// explain it as well: where its gain in 2 ln likelihood, after the price of its parameters, is less than discovery asks for.
-fn insignificant(refined: &Refined, steps: &[Step]) -> Option<(usize, usize)> {
+fn insignificant(refined: &Refined, steps: &[Accepted]) -> Option<(usize, usize)> {
     let hypothesis = &refined.fit.hypothesis;
     (0..hypothesis.members.len())
         .filter_map(|at| Some((significance(refined, at)?, at, step_of(hypothesis, at, steps)?)))
@@ -105,11 +105,11 @@ fn significance(refined: &Refined, at: usize) -> Option<f64> {
     Some(value.dot(&(scaled_inverse(&block, 0.0)? * &value)) - own.len() as f64 * n.ln())
 }
 
-/// Makes the last step, unless held-back data speak against it: then the estimate stays, and by how much it would have
+/// Makes the last step, unless the samples speak against it: then the estimate stays, and by how much it would have
 /// moved counts as its error (Hausman 1978).
 fn settled(dataset: &Dataset, fitted: &mut Fitted, refined: Refined) -> DMatrix<f64> {
     let left = |fit: &Fit| {
-        evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None).mean_square()
+        evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
     };
     let Refined { fit, mut covariance, .. } = refined;
     if left(&fit) <= WORSE * left(&fitted.fit) {
@@ -128,7 +128,7 @@ fn settled(dataset: &Dataset, fitted: &mut Fitted, refined: Refined) -> DMatrix<
 
 /// A correction without a cause that the energy balance contradicts stands for something else: what the other unknowns
 /// would move by without it counts as their error.
-fn doubted(fit: &Fit, steps: &[Step], mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+fn doubted(fit: &Fit, steps: &[Accepted], mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     let n = fit.unknowns.len();
     let before = covariance.clone();
     for (at, member) in fit.hypothesis.members.iter().enumerate().filter(|(_, m)| m.origin == Origin::Empirical) {

@@ -6,20 +6,16 @@
 
 use rayon::prelude::*;
 
-use crate::diagnostics::evaluate::evaluate;
-use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
-use crate::estimation::residuals::Window;
 use crate::estimation::subsets::Superset;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
-use crate::selection::step::Step;
+use crate::selection::step::{Accepted, State};
 use crate::selection::trial::{
     Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK, REFUTED, balance, count,
-    extend, floor, mean_square, on_heldout, price, refit, sample_cost,
+    extend, floor, mean_square, on_fit, price, refit, sample_cost, validated,
 };
 
 /// Two candidates refitted together.
@@ -33,12 +29,12 @@ struct Pair<'a> {
 ///
 /// # Errors
 /// As for the fit.
-pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, [Step; 2])>, Refusal> {
+pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, [Accepted; 2])>, Refusal> {
     let apart = Distinguishable::on(dataset);
     if dataset.excess() < NOTHING_LEFT || !apart.rates {
         return Ok(None);
     }
-    let before = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+    let before = on_fit(dataset, &fitted.fit);
     let causes: Vec<Candidate> = candidates(dataset, &fitted.fit.hypothesis, &before, &before)
         .into_iter()
         .filter(|c| c.refine.is_none() && apart.can_be_named(c) && c.id.description().onsets.is_empty())
@@ -67,22 +63,19 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
     if matches!(balances, [Some(before), Some(after)] if after > REFUTED * before) {
         return Ok(None);
     }
-    let before_it = Before::of(dataset, &fitted.fit);
+    let before_it = Before::of(dataset, fitted);
     let next = fit_with_ring_downs(dataset, &best.fit.hypothesis)?;
-    let after = on_heldout(dataset, &next.fit);
-    let is_noise = after.mean_square() <= (NOTHING_LEFT * floor(dataset, &next.fit)).powi(2);
-    if !is_noise || !before_it.is_improved_by(after.mean_square()) {
+    let after = validated(dataset, &next);
+    let is_noise = after <= (NOTHING_LEFT * floor(dataset, &next.fit)).powi(2);
+    if !is_noise || !before_it.is_improved_by(after) {
         return Ok(None);
     }
-    let rms = [before_it.mean_square, after.mean_square()].map(|square| square.sqrt().to_degrees());
-    let step = |candidate: &Candidate| Step {
+    let step = |candidate: &Candidate| Accepted {
         id: candidate.id,
         origin: Origin::Discovered,
         gain: best.gain,
         rivals: Vec::new(),
-        heldout_rms_deg: rms,
-        heldout: after.size(),
-        harmonics: pattern_harmonics(&after),
+        states: [&fitted.fit, &next.fit].map(State::of),
         confounded_with: Vec::new(),
         energy_balance: balances[0].zip(balances[1]).map(|(a, b)| [a.sqrt(), b.sqrt()]),
         inconsistency: None,

@@ -7,19 +7,15 @@
 
 use cvg_model::effects::Role as ParameterRole;
 
-use crate::diagnostics::evaluate::evaluate;
-use crate::diagnostics::residual::pattern_harmonics;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
-use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin};
-use crate::recording::Role;
 use crate::selection::candidates::{Candidate, candidates};
 use crate::selection::discovery::drop_weak;
-use crate::selection::step::Step;
+use crate::selection::step::{Accepted, State};
 use crate::selection::trial::{
-    Before, CAREFUL, Distinguishable, NOTHING_LEFT, QUICK, REFUTED, balance, count, extend, floor, heldout,
-    mean_square, on_heldout, refit,
+    Before, CAREFUL, Distinguishable, NOTHING_LEFT, QUICK, REFUTED, balance, count, extend, floor, mean_square, on_fit,
+    refit, validated,
 };
 
 /// Fits of everything, each from where the last one ended.
@@ -34,21 +30,21 @@ const SIMPLE: usize = 2;
 pub(super) fn all_together(
     dataset: &mut Dataset,
     fitted: &Fitted,
-    steps: &[Step],
-) -> Result<Option<(Fitted, Vec<Step>)>, Refusal> {
+    steps: &[Accepted],
+) -> Result<Option<(Fitted, Vec<Accepted>)>, Refusal> {
     let apart = Distinguishable::on(dataset);
     let driven = dataset.tracks.iter().all(|t| t.track.records_the_loops());
     if dataset.excess() < NOTHING_LEFT || !apart.rates || !driven {
         return Ok(None);
     }
-    let before_it = Before::of(dataset, &fitted.fit);
+    let before_it = Before::of(dataset, fitted);
     let balance_before = balance(dataset, &fitted.fit);
     // unequal drives are one more cause
     dataset.drive_is_free_at_once = true;
     for most in [SIMPLE, usize::MAX] {
         let Some((mut next, mut came)) = everything(dataset, fitted, most)? else { continue };
         drop_weak(dataset, &mut next, &mut came)?;
-        let left = on_heldout(dataset, &next.fit).mean_square();
+        let left = validated(dataset, &next);
         let refuted =
             balance_before.zip(balance(dataset, &next.fit)).is_some_and(|(before, after)| after > REFUTED * before);
         // the same causes again would go in circles
@@ -62,7 +58,7 @@ pub(super) fn all_together(
 }
 
 /// The declared model with every cause of at most `most` parameters, where that leaves noise.
-fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Option<(Fitted, Vec<Step>)>, Refusal> {
+fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Option<(Fitted, Vec<Accepted>)>, Refusal> {
     let mut declared = fitted.fit.hypothesis.clone();
     // what came in before stands for what was missing then
     declared.members.retain(|m| m.origin == Origin::Declared);
@@ -86,21 +82,18 @@ fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Opt
 }
 
 fn is_noise(dataset: &Dataset, fitted: &Fitted) -> bool {
-    heldout(dataset, &fitted.fit) <= (NOTHING_LEFT * floor(dataset, &fitted.fit)).powi(2)
+    validated(dataset, fitted) <= (NOTHING_LEFT * floor(dataset, &fitted.fit)).powi(2)
 }
 
 /// One of the causes that came in together: what they gained, they gained together.
-fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2]) -> Step {
-    let evaluations = [before, after].map(|f| on_heldout(dataset, &f.fit));
+fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2]) -> Accepted {
     let balances = [before, after].map(|f| balance(dataset, &f.fit).map(f64::sqrt));
-    Step {
+    Accepted {
         id: cause.id,
         origin: Origin::Discovered,
         gain: count(&after.fit) * (mean_square(&before.fit) / mean_square(&after.fit)).ln(),
         rivals: Vec::new(),
-        heldout_rms_deg: evaluations.each_ref().map(|e| e.mean_square().sqrt().to_degrees()),
-        heldout: evaluations[1].size(),
-        harmonics: pattern_harmonics(&evaluations[1]),
+        states: [before, after].map(|f| State::of(&f.fit)),
         confounded_with: Vec::new(),
         energy_balance: balances[0].zip(balances[1]).map(|(before, after)| [before, after]),
         inconsistency: None,
@@ -111,7 +104,7 @@ fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2]) -> 
 /// Every cause that the campaign could name and that no search has to place, unless it is in already.
 fn causes(dataset: &Dataset, hypothesis: &Hypothesis, fitted: &Fitted) -> Vec<Candidate> {
     let apart = Distinguishable::on(dataset);
-    let left = evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Whole, None);
+    let left = on_fit(dataset, &fitted.fit);
     let placed = |c: &Candidate| {
         let parameters = c.id.description().parameters;
         parameters.iter().any(|p| matches!(p.role, ParameterRole::Searched(_) | ParameterRole::Located(_)))

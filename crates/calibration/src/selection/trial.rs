@@ -1,4 +1,5 @@
-//! A candidate on trial: the model refitted with it, what that gains, and what it leaves of data that was not fitted.
+//! A candidate on trial: the model refitted with it, what that gains, and what it leaves of fitted data under cross-validation.
+//! The held-out runs are not seen here.
 
 use cvg_model::effects::{Role as ParameterRole, Stage};
 
@@ -6,6 +7,7 @@ use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
 use crate::error::Refusal;
 use crate::estimation::amplitude_equation::energy_balance;
+use crate::estimation::cross_validation::cross_validated;
 use crate::estimation::fit::{Effort, Fit, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
@@ -17,9 +19,9 @@ use crate::selection::candidates::Candidate;
 pub(super) const LEAST_GAIN: f64 = 12.0;
 /// By how much it must beat a rival of the library to be told apart from it.
 pub(super) const LEAST_LEAD: f64 = 8.0;
-/// The share of the held-out mean square that it must remove.
-pub(super) const LEAST_HELDOUT_GAIN: f64 = 0.05;
-/// What it removes from the held-out error must be this large beside the noise floor: smaller ones are often what a
+/// The share of the cross-validated mean square that it must remove.
+pub(super) const LEAST_VALIDATED_GAIN: f64 = 0.05;
+/// What it removes from the cross-validated error must be this large beside the noise floor: smaller ones are often what a
 /// larger effect leaves when its place in the chain of the readout is not quite the library's.
 const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
 /// A cause under which the energy balance leaves this many times the mean square is refuted.
@@ -117,39 +119,40 @@ pub(super) fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), 
     Ok(())
 }
 
-/// What was left of the held-out samples before a step, and how much of it has to go.
+/// What cross-validation left before a step, and how much of it has to go.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before {
-    /// held-out mean square, rad²
+    /// cross-validated mean square, rad²
     pub(super) mean_square: f64,
     least_removed: f64,
 }
 
 impl Before {
-    pub(super) fn of(dataset: &Dataset, fit: &Fit) -> Self {
-        let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, fit)).powi(2);
-        Self { mean_square: heldout(dataset, fit), least_removed }
+    pub(super) fn of(dataset: &Dataset, fitted: &Fitted) -> Self {
+        let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, &fitted.fit)).powi(2);
+        Self { mean_square: validated(dataset, fitted), least_removed }
     }
 
     /// Whether what is left after a step is less by enough to name what it added.
     pub(super) fn is_improved_by(self, after: f64) -> bool {
-        after <= (1.0 - LEAST_HELDOUT_GAIN) * self.mean_square && self.mean_square - after >= self.least_removed
+        after <= (1.0 - LEAST_VALIDATED_GAIN) * self.mean_square && self.mean_square - after >= self.least_removed
     }
 }
 
-/// White part of the held-out error, rad.
+/// White part of the error, rad.
 pub(super) fn floor(dataset: &Dataset, fit: &Fit) -> f64 {
-    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Dense, None).noise_floor()
+    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Dense, None).noise_floor()
 }
 
-/// A fit on the held-out data.
-pub(super) fn on_heldout(dataset: &Dataset, fit: &Fit) -> Evaluation {
-    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Holdout, Window::Whole, None)
+/// What a fit leaves of its samples.
+pub(super) fn on_fit(dataset: &Dataset, fit: &Fit) -> Evaluation {
+    evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None)
 }
 
-/// Held-out mean square of a fit, rad².
-pub(super) fn heldout(dataset: &Dataset, fit: &Fit) -> f64 {
-    on_heldout(dataset, fit).mean_square()
+/// Cross-validated mean square of a fit, rad².
+pub(super) fn validated(dataset: &Dataset, fitted: &Fitted) -> f64 {
+    let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
+    cross_validated(&dataset.tracks, &fitted.fit, &priors, CAREFUL.thinned)
 }
 
 /// What the fitted runs can tell apart.

@@ -1,0 +1,43 @@
+//! The held-out runs are read when all is decided: another held-out run changes the error that is reported, and nothing else.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::recording::{Campaign, Role};
+use cvg_calibration::report::{EffectReport, Report};
+use cvg_calibration::{Options, Origin, identify};
+use cvg_simulator::Scenario;
+
+/// What the held-out runs read on X that no other does, V: an error twice as large as that of the cubic readout, which is not
+/// borne out there, then.
+const OFFSET_V: f64 = 3e-3;
+
+fn report(change: impl Fn(&mut Campaign)) -> Report {
+    let folder = tempfile::tempdir().unwrap();
+    Scenario::paper().simulate().write(folder.path()).unwrap();
+    let mut campaign = Campaign::open(&folder.path().join("campaign.toml")).unwrap();
+    change(&mut campaign);
+    identify(campaign, &Options::default()).unwrap().report
+}
+
+#[test]
+fn what_is_held_out_changes_the_reported_error_and_no_answer() {
+    let as_it_was = report(|_| {});
+    let with_another = report(|campaign| {
+        let held_out: Vec<_> = campaign.runs.iter_mut().filter(|r| r.role == Role::Holdout).collect();
+        assert!(!held_out.is_empty());
+        for run in held_out {
+            run.recording.xc_v.iter_mut().flatten().for_each(|x| *x += OFFSET_V);
+        }
+    });
+    let answers = |r: &Report| {
+        let effects: Vec<_> = r.effects.iter().map(|e| (e.id.clone(), e.origin, e.parameters.clone())).collect();
+        let steps: Vec<_> = r.steps.iter().map(|s| (s.effect.clone(), s.gain)).collect();
+        (r.angular_gain, r.detection_gain_ratio, r.actuation_gain_ratio, effects, steps)
+    };
+    assert_eq!(answers(&as_it_was), answers(&with_another));
+    let discovered = |e: &&EffectReport| e.origin == Origin::Discovered;
+    let found: Vec<_> = with_another.effects.iter().filter(discovered).map(|e| e.id.as_str()).collect();
+    assert_eq!(found, ["detection-cubic"]);
+    let [before, after] = [&as_it_was, &with_another].map(|r| r.heldout.discovered.rms_deg);
+    assert!(after > 3.0 * before, "{before} and {after}");
+    assert!(with_another.runs.iter().all(|r| r.r#use != "left out"), "{:?}", with_another.runs);
+}
