@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::{Campaign, Instrument};
+use cvg_calibration::recording::{Campaign, Instrument, read_text};
 use cvg_calibration::report::refused::{About, Refused};
 use cvg_calibration::{Answer, Cause, EffectText, Identification, Options};
 use cvg_model::effects::EffectId;
@@ -20,8 +20,8 @@ use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
 pub(crate) fn simulate(scenario: &Path, out: &Path) -> Result<(), Failure> {
-    let text = std::fs::read_to_string(scenario)
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", scenario.display())))?;
+    let text =
+        read_text(scenario).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", scenario.display())))?;
     let parsed = scenario_of(&text, &scenario.display().to_string())?;
     output::check_folder(out)?;
     let progress = Progress::begin();

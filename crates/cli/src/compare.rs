@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cvg_calibration::calibration::Calibration;
+use cvg_calibration::recording::read_text;
 use serde_json::{Value, json};
 
 use crate::report::significant;
@@ -91,7 +92,7 @@ fn answer(path: &Path) -> Result<Answer, Failure> {
             device: calibration.device,
         });
     }
-    let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
+    let text = read_text(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
     let report: Value = serde_json::from_str(&text).map_err(|e| bad(format!("is no report: {e}")))?;
     if !report["schema"].as_str().is_some_and(|s| s.starts_with("cvg.report/")) {
         return Err(bad("is no report".into()));

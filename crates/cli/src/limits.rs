@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use cvg_calibration::recording::read_text;
 use cvg_model::effects::EffectId;
 use serde_json::Value;
 use toml::Table;
@@ -39,7 +40,7 @@ impl Limits {
     /// Reads a limits file.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path)
             .map_err(|e| Failure::within(format!("{name}: cannot be read: {e}; wanted {WANTED}"), &name.to_string()))?;
         Self::of_text(&text, &name.to_string())
     }

@@ -423,3 +423,19 @@ fn an_output_folder_that_is_a_file_is_refused() {
     assert_refused(&[OsStr::new("demo"), OsStr::new("--out"), out.as_os_str()], &["taken", "is a file", "folder"]);
     assert_eq!(bench.read("taken"), "a file");
 }
+
+#[test]
+fn a_text_that_never_ends_is_refused() {
+    let bench = Bench::small();
+    let endless = bench.path("endless.toml");
+    fs::File::create(&endless).unwrap().set_len(1 << 40).unwrap();
+    let (campaign, out) = (bench.campaign(), bench.path("out"));
+    let [endless, campaign, out] = [&endless, &campaign, &out].map(|path| path.as_os_str());
+    let [identify, to] = ["identify", "--out"].map(OsStr::new);
+    assert_refused(&[identify, endless, to, out], &["endless.toml", "larger than"]);
+    assert_refused(&[identify, campaign, OsStr::new("--effect"), endless, to, out], &["endless.toml", "larger than"]);
+    assert_refused(&[identify, campaign, OsStr::new("--limits"), endless, to, out], &["endless.toml", "larger than"]);
+    assert_refused(&[OsStr::new("simulate"), endless, to, out], &["endless.toml", "larger than"]);
+    assert_refused(&[OsStr::new("compare"), endless, endless], &["endless.toml", "larger than"]);
+    assert_refused(&[OsStr::new("compensate"), endless, campaign, to, out], &["endless.toml", "larger than"]);
+}

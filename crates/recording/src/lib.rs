@@ -26,6 +26,7 @@ mod raw;
 mod requirement;
 mod stamp;
 mod table;
+mod text;
 mod units;
 mod unknown;
 
@@ -40,6 +41,7 @@ pub use memory::{limit_memory, memory_limit, panic_is_answer};
 pub use naming::Naming;
 #[cfg(feature = "parquet")]
 pub use parquet::{Lake, write_parquet, write_parquet_numbers};
+pub use text::{LARGEST_TEXT, read_text};
 pub use unknown::{Cells, UnknownColumn};
 
 /// One recording: columns of equal length, one value a row.

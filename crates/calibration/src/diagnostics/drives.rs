@@ -5,8 +5,8 @@
 //! It refuses to look at the angle. A fit of that takes the level from here, with its uncertainty.
 
 use cvg_estimator::direction::{Direction, major_axis};
-use cvg_model::AxisForces;
 use cvg_model::effects::{EffectId, Stage, Values};
+use cvg_model::{AxisForces, Envelope};
 
 use crate::data::track::Track;
 use crate::estimation::joint_fit::Dataset;
@@ -55,40 +55,57 @@ struct Pair {
     /// of the pattern, mean
     cos2: f64,
     sin2: f64,
+    /// largest force around it, V
+    largest: f64,
     around: [Instant; 4],
+}
+
+/// Half the quadrature over the energy, and the vibration that has it, at four even samples.
+type Around = [(Envelope<f64>, f64); 4];
+
+/// How far the quadrature of one of the inner two lies from the mean of its neighbours.
+fn bent(around: &Around, inner: usize) -> f64 {
+    around[inner].1 - 0.5 * (around[inner - 1].1 + around[inner + 1].1)
 }
 
 /// The pairs of a track whose commands tell what acted between them.
 fn pairs(track: &Track, hypothesis: &Hypothesis, out: &mut Vec<Pair>, stride: usize) {
     let quadrature = |i: usize| {
-        let seen = track.envelope(i);
-        let z = hypothesis.unread(seen, &track.moment(i, 0.0));
-        (z, 0.5 * z.pendulum().q / z.pendulum().e)
+        let z = hypothesis.unread(track.envelope(i), &track.moment(i, 0.0));
+        let p = z.pendulum();
+        (z, 0.5 * p.q / p.e)
     };
-    let bent = |i: usize| quadrature(i).1 - 0.5 * (quadrature(i - 1).1 + quadrature(i + 1).1);
-    let fitted = || track.segments.iter().filter(|s| s.role == Role::Fit);
-    let inner = || fitted().flat_map(|s| s.range.start + 1..s.range.end.saturating_sub(2)).step_by(stride);
-    let limit = SPIKE * robust_deviation(inner().map(bent));
-    for i in inner() {
+    let fitted = track.segments.iter().filter(|s| s.role == Role::Fit);
+    let inner = fitted.flat_map(|s| s.range.start + 1..s.range.end.saturating_sub(2)).step_by(stride);
+    let all: Vec<(usize, Around)> = inner.map(|i| (i, [i - 1, i, i + 1, i + 2].map(quadrature))).collect();
+    let limit = SPIKE * robust_deviation(all.iter().map(|(_, around)| bent(around, 1)));
+    for (i, seen) in all {
         let dt = track.t_s[i + 1] - track.t_s[i];
         let turns_little = track.commands(i, 1).is_some_and(|v| (v.turn_rad_s * dt).abs() < LARGEST_TURN_RAD);
-        if !turns_little || bent(i).abs() > limit || bent(i + 1).abs() > limit {
+        if !turns_little || bent(&seen, 1).abs() > limit || bent(&seen, 2).abs() > limit {
             continue;
         }
-        let [before, after] = [quadrature(i).1, quadrature(i + 1).1];
-        let around = [i - 1, i, i + 1, i + 2].map(|i| {
-            let z = quadrature(i).0;
+        let [_, (_, before), (_, after), _] = seen;
+        let around: [Instant; 4] = std::array::from_fn(|j| {
+            let z = seen[j].0;
             let p = z.pendulum();
-            Instant { volts: track.moment(i, 0.0).drive, axis: major_axis(&z, &p), per_amplitude: 1.0 / p.e.sqrt() }
+            let volts = track.moment(i + j - 1, 0.0).drive;
+            Instant { volts, axis: major_axis(&z, &p), per_amplitude: 1.0 / p.e.sqrt() }
         });
         out.push(Pair {
             widening: (after - before) / dt,
             q: 0.5 * (before + after),
             cos2: mean(&around, |at| at.axis.cos * at.axis.cos - at.axis.sin * at.axis.sin),
             sin2: mean(&around, |at| 2.0 * at.axis.sin * at.axis.cos),
+            largest: around.iter().map(|at| size(&at.volts)).fold(0.0, f64::max),
             around,
         });
     }
+}
+
+/// The larger of the two forces, V.
+fn size(f: &AxisForces<f64>) -> f64 {
+    f.x_c.hypot(f.x_s).max(f.y_c.hypot(f.y_s))
 }
 
 /// The mean of `of` between the inner two of four samples.
@@ -101,9 +118,17 @@ struct Balance {
     pairs: Vec<Pair>,
     /// what the drives do besides, in its order
     actuation: Vec<(EffectId, Values<f64>)>,
+    /// what each pair was pushed by where nothing clips: most of them, at the levels that are tried
+    unclipped: Vec<f64>,
 }
 
 impl Balance {
+    fn new(pairs: Vec<Pair>, actuation: Vec<(EffectId, Values<f64>)>) -> Self {
+        let mut balance = Self { pairs, actuation, unclipped: Vec::new() };
+        balance.unclipped = balance.pairs.iter().map(|pair| balance.pushed(pair, 0.0)).collect();
+        balance
+    }
+
     /// What a pair was pushed by, per unit of force scale and amplitude, where drives clip at 1/`inverse_level`.
     fn pushed(&self, pair: &Pair, inverse_level: f64) -> f64 {
         mean(&pair.around, |at| {
@@ -115,8 +140,11 @@ impl Balance {
 
     /// Mean square of what is left of q̇/a with the force scale, the split and the damping that leave least.
     fn left(&self, inverse_level: f64) -> f64 {
-        let row = |p: &Pair| [self.pushed(p, inverse_level), p.sin2, p.cos2, p.q];
-        let rows: Vec<[f64; 4]> = self.pairs.iter().map(row).collect();
+        let row = |(p, unclipped): (&Pair, &f64)| {
+            let clips = p.largest * inverse_level > 1.0;
+            [if clips { self.pushed(p, inverse_level) } else { *unclipped }, p.sin2, p.cos2, p.q]
+        };
+        let rows: Vec<[f64; 4]> = self.pairs.iter().zip(&self.unclipped).map(row).collect();
         let mut equations = NormalEquations::new(4);
         for (row, pair) in rows.iter().zip(&self.pairs) {
             equations.add(row, pair.widening);
@@ -129,7 +157,6 @@ impl Balance {
     }
 
     fn largest_command(&self) -> f64 {
-        let size = |f: &AxisForces<f64>| f.x_c.hypot(f.x_s).max(f.y_c.hypot(f.y_s));
         let mut all: Vec<f64> = self.pairs.iter().map(|p| size(&p.around[1].volts)).collect();
         all.sort_by(f64::total_cmp);
         // a few may be spikes
@@ -204,7 +231,7 @@ pub(crate) fn clipping(dataset: &Dataset, hypothesis: &Hypothesis) -> Option<Cli
     dataset.tracks.iter().for_each(|p| pairs(p.track.dense(), hypothesis, &mut all, rows.div_ceil(LOOKED_AT).max(1)));
     let others = hypothesis.acting(Stage::Actuation).filter(|(_, m)| m.id != EffectId::DriveSaturation);
     let actuation = others.map(|(_, m)| (m.id, m.values)).collect();
-    let balance = Balance { pairs: all, actuation };
+    let balance = Balance::new(all, actuation);
     let (n, largest) = (balance.pairs.len() as f64, balance.largest_command());
     if n < 10.0 * FEWEST_BEYOND as f64 || largest <= 0.0 {
         return None;
@@ -213,11 +240,7 @@ pub(crate) fn clipping(dataset: &Dataset, hypothesis: &Hypothesis) -> Option<Cli
     let after = balance.left(x);
     let by_chance = n * (before / after).ln();
     let gain = by_chance - n.ln() - 2.0 * ((TRIED + REFINED) as f64).ln();
-    let beyond = |at: &Instant| {
-        let v = &at.volts;
-        v.x_c.hypot(v.x_s).max(v.y_c.hypot(v.y_s)) * x > 1.0
-    };
-    let count = balance.pairs.iter().filter(|p| beyond(&p.around[1])).count();
+    let count = balance.pairs.iter().filter(|p| size(&p.around[1].volts) * x > 1.0).count();
     if by_chance < LIKELY {
         return None;
     }

@@ -11,7 +11,7 @@ use crate::error::Refusal;
 use crate::model::angle_table::AngleTable;
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
 use crate::model::written::EffectText;
-use crate::recording::Instrument;
+use crate::recording::{Instrument, read_text};
 use crate::report::{Input, Tool};
 
 /// Identifier of the format.
@@ -218,8 +218,8 @@ impl Calibration {
     /// Where the file cannot be read, or is refused.
     pub fn read(path: &Path) -> Result<Self, Refusal> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| Refusal::new(&name, format!("cannot be read: {e}"), "a calibration.toml"))?;
+        let text =
+            read_text(path).map_err(|e| Refusal::new(&name, format!("cannot be read: {e}"), "a calibration.toml"))?;
         Self::from_text(&text, &name)
     }
 }

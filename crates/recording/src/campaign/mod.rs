@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use super::Recording;
 use super::error::ReadError;
 use super::naming::Naming;
-use super::raw;
+use super::{raw, text};
 use manifest::{Entry, Manifest, Position};
 
 /// What kind of instrument was recorded.
@@ -239,7 +239,7 @@ impl Campaign {
         if std::fs::metadata(path).map_err(io)?.is_dir() {
             return Err(ReadError::Directory { path: path.to_path_buf() });
         }
-        manifest::parse(&std::fs::read(path).map_err(io)?, path)
+        manifest::parse(&text::bytes_of(path).map_err(io)?, path)
     }
 
     fn open_manifest(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {

@@ -19,6 +19,7 @@ use cvg_model::{AxisForces, Envelope};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
+use crate::recording::read_text;
 
 /// The largest file, bytes.
 const MAX_FILE: usize = 131_072;
@@ -149,12 +150,7 @@ impl EffectText {
     /// Where it cannot be read, is no effect file, or an expression is wrong.
     pub fn read(path: &Path) -> Result<Self, Refusal> {
         let name = path.display().to_string();
-        let size = std::fs::metadata(path).map_or(0, |m| m.len());
-        if size > MAX_FILE as u64 {
-            return Err(Refusal::new(&name, format!("larger than {MAX_FILE} bytes"), FORM));
-        }
-        let text =
-            std::fs::read_to_string(path).map_err(|e| Refusal::new(&name, format!("cannot be read: {e}"), FORM))?;
+        let text = read_text(path).map_err(|e| Refusal::new(&name, format!("cannot be read: {e}"), FORM))?;
         Self::parse(&text, &name)
     }
 
