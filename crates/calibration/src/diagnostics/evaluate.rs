@@ -140,6 +140,14 @@ impl Evaluation {
         sum / n.max(1) as f64
     }
 
+    /// Mean square of the kept errors of a track, rad²; nothing where none of it is there.
+    pub(crate) fn mean_square_of(&self, track: usize) -> f64 {
+        let own = self.segments.iter().zip(&self.kept).filter(|(s, _)| s.track == track);
+        let errors = own.flat_map(|(s, kept)| s.angle.iter().zip(kept).filter(|(_, k)| **k).map(|(a, _)| *a));
+        let (n, sum) = errors.fold((0usize, 0.0), |(n, s), a| (n + 1, s + a * a));
+        sum / n.max(1) as f64
+    }
+
     /// Size of the error.
     pub(crate) fn size(&self) -> ErrorSize {
         let peak = self.errors().fold(0.0f64, |m, a| m.max(a.abs()));

@@ -15,7 +15,7 @@ use crate::selection::step::{Accepted, step_of};
 use crate::selection::trial::LEAST_GAIN;
 use cvg_model::effects::Role as ParameterRole;
 
-/// A last step that leaves more than this many times the mean square is not made: it is linear, and
+/// A last step that leaves more than this many times the mean square of a run is not made: it is linear, and
 /// what it moves was not.
 const WORSE: f64 = 1.1;
 
@@ -105,14 +105,15 @@ fn significance(refined: &Refined, at: usize) -> Option<f64> {
     Some(value.dot(&(scaled_inverse(&block, 0.0)? * &value)) - own.len() as f64 * n.ln())
 }
 
-/// Makes the last step, unless the samples speak against it: then the estimate stays, and by how much it would have
-/// moved counts as its error (Hausman 1978).
+/// Makes the last step, unless a run speaks against it: then the estimate stays, and by how much it would have moved counts as
+/// its error (Hausman 1978).
 fn settled(dataset: &Dataset, fitted: &mut Fitted, refined: Refined) -> DMatrix<f64> {
-    let left = |fit: &Fit| {
-        evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
+    let left = |fit: &Fit| -> Vec<f64> {
+        let all = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None);
+        (0..dataset.tracks.len()).map(|track| all.mean_square_of(track)).collect()
     };
     let Refined { fit, mut covariance, .. } = refined;
-    if left(&fit) <= WORSE * left(&fitted.fit) {
+    if left(&fit).iter().zip(left(&fitted.fit)).all(|(after, before)| *after <= WORSE * before) {
         fitted.fit = fit;
         return covariance;
     }
