@@ -79,10 +79,8 @@ fn seven_faults_at_once_are_told_without_ring_downs() {
         let (left, floor) = (report.heldout.discovered.rms_deg, report.heldout.noise_floor_deg);
         assert!(left < 1.3 * floor, "{seed}: {left} of {floor}");
         let off = off(&device, &report);
-        // of the second, what the fitted runs leave without skew and phase is noise as well: they are not told, and nothing wrong is
-        let told = off.iter().filter(|z| z.is_finite()).count();
-        assert!(told == off.len() || seed != 60_000, "{seed}: {off:?}");
-        assert!(told > 0 && !off.iter().any(|z| z.abs() >= 4.0), "{seed}: {off:?}");
+        assert!(off.iter().all(|z| z.abs() < 4.0), "{seed}: {off:?}");
+        assert!(report.steps.iter().all(|s| s.gain.is_none_or(|gain| gain > 0.0)), "{seed}: {:?}", report.steps);
     }
 }
 

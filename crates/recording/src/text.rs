@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::memory::memory_limit;
 
-/// A text is no larger than this, bytes: reports of thousands of runs are a tenth of it.
+/// A text is no larger than this, bytes.
 pub const LARGEST_TEXT: u64 = 64 << 20;
 
 /// The bytes of a text.

@@ -97,6 +97,12 @@ fn take_line(s: &mut Residual, keep: &[bool]) {
     }
 }
 
+/// Mean square of errors; nothing of none.
+fn mean_square(errors: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = errors.fold((0usize, 0.0), |(n, s), a| (n + 1, s + a * a));
+    sum / n.max(1) as f64
+}
+
 impl Evaluation {
     /// Residuals less the best line of each segment, with the spikes of `like` where given. What lasts longer than two
     /// samples is an error and no spike.
@@ -136,16 +142,13 @@ impl Evaluation {
 
     /// Mean square of the kept errors, rad².
     pub(crate) fn mean_square(&self) -> f64 {
-        let (n, sum) = self.errors().fold((0usize, 0.0), |(n, s), a| (n + 1, s + a * a));
-        sum / n.max(1) as f64
+        mean_square(self.errors())
     }
 
     /// Mean square of the kept errors of a track, rad²; nothing where none of it is there.
     pub(crate) fn mean_square_of(&self, track: usize) -> f64 {
         let own = self.segments.iter().zip(&self.kept).filter(|(s, _)| s.track == track);
-        let errors = own.flat_map(|(s, kept)| s.angle.iter().zip(kept).filter(|(_, k)| **k).map(|(a, _)| *a));
-        let (n, sum) = errors.fold((0usize, 0.0), |(n, s), a| (n + 1, s + a * a));
-        sum / n.max(1) as f64
+        mean_square(own.flat_map(|(s, kept)| s.angle.iter().zip(kept).filter(|(_, k)| **k).map(|(a, _)| *a)))
     }
 
     /// Size of the error.

@@ -118,6 +118,7 @@ mod tests {
         let (t, r): (Vec<f64>, Vec<f64>) = left.into_iter().unzip();
         let (slope, intercept) = line(&t, &r);
         let expected = t.iter().zip(&r).map(|(t, r)| (r - slope * t - intercept).powi(2)).sum::<f64>() / ROWS as f64;
+        // a stretch in the middle parts the rest in two, each with a bias of its own: one unknown more in four fifths of the fits
         assert!((found - expected).abs() < 0.1 * expected, "{found:e} and not {expected:e}");
     }
 

@@ -21,13 +21,11 @@ use crate::selection::pairs::best_pair;
 use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
-    Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN, NOTHING_LEFT, QUICK,
-    REFUTED, Trial, balance, count, extend, extend_from, mean_square, on_fit, price, refit, restore, sample_cost,
-    validated,
+    BY_AMPLITUDE, Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN,
+    NOTHING_LEFT, QUICK, REFUTED, Trial, balance, count, extend, extend_from, mean_square, on_fit, price, refit,
+    restore, sample_cost, validated,
 };
 
-/// A cause under which it leaves this share or less of what it leaves under a rival is told from that.
-const BY_AMPLITUDE: f64 = 0.8;
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 8;
 

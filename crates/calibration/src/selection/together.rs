@@ -4,6 +4,9 @@
 //! Adding the best effect, one at a time, goes astray where half a dozen of one size are missing: under each of them the residual
 //! keeps the others' memory, in which samples are worth little, and what takes a share of several at once looks like the cause.
 //! So many parameters describe much that is none of them: they are believed only where they leave nothing but noise.
+//!
+//! What goes astray may also end at the noise, with a correction that has no cause in the place of several that have. The angle
+//! does not ask for more then, but where the energy balance contradicts that correction, it does.
 
 use cvg_model::effects::Role as ParameterRole;
 
@@ -14,8 +17,8 @@ use crate::selection::candidates::{Candidate, candidates};
 use crate::selection::discovery::drop_weak;
 use crate::selection::step::{Accepted, State};
 use crate::selection::trial::{
-    Before, CAREFUL, Distinguishable, NOTHING_LEFT, QUICK, REFUTED, balance, count, extend, floor, mean_square, on_fit,
-    refit, validated,
+    BY_AMPLITUDE, Before, CAREFUL, Distinguishable, NOTHING_LEFT, QUICK, REFUTED, balance, count, extend, floor,
+    on_fit, refit, validated,
 };
 
 /// Fits of everything, each from where the last one ended.
@@ -23,7 +26,8 @@ const FITS: usize = 3;
 /// Causes of more parameters than this come in where those of fewer are not enough.
 const SIMPLE: usize = 2;
 
-/// The causes that explain all that single steps left, with what remains of `steps`; none where they leave more than noise.
+/// The causes that explain all that single steps left, or described against the energy balance; none where they leave more than
+/// noise.
 ///
 /// # Errors
 /// As for the fit.
@@ -34,7 +38,9 @@ pub(super) fn all_together(
 ) -> Result<Option<(Fitted, Vec<Accepted>)>, Refusal> {
     let apart = Distinguishable::on(dataset);
     let driven = dataset.tracks.iter().all(|t| t.track.records_the_loops());
-    if dataset.excess() < NOTHING_LEFT || !apart.rates || !driven {
+    let much_is_left = dataset.excess() >= NOTHING_LEFT;
+    let contradicted = steps.iter().any(|s| s.origin == Origin::Empirical && s.contradicted);
+    if !(much_is_left || contradicted) || !apart.rates || !driven {
         return Ok(None);
     }
     let before_it = Before::of(dataset, fitted);
@@ -45,11 +51,14 @@ pub(super) fn all_together(
         let Some((mut next, mut came)) = everything(dataset, fitted, most)? else { continue };
         drop_weak(dataset, &mut next, &mut came)?;
         let left = validated(dataset, &next);
-        let refuted =
-            balance_before.zip(balance(dataset, &next.fit)).is_some_and(|(before, after)| after > REFUTED * before);
+        let balances = balance_before.zip(balance(dataset, &next.fit));
+        let refuted = balances.is_some_and(|(before, after)| after > REFUTED * before);
+        let closes = balances.is_some_and(|(before, after)| after < BY_AMPLITUDE * before);
+        let explains =
+            if much_is_left { before_it.is_improved_by(left) } else { closes && before_it.is_as_large_as(left) };
         // the same causes again would go in circles
         let anew = came.iter().any(|c| steps.iter().all(|s| s.id != c.id));
-        if anew && !refuted && is_noise(dataset, &next) && before_it.is_improved_by(left) {
+        if anew && !refuted && is_noise(dataset, &next) && explains {
             return Ok(Some((next, came)));
         }
     }
@@ -73,7 +82,9 @@ fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Opt
     for _ in 0..FITS {
         let next = fit_with_ring_downs(dataset, &hypothesis)?;
         if is_noise(dataset, &next) {
-            let came = causes.iter().map(|cause| step(dataset, cause, [fitted, &next])).collect();
+            let left = [fitted, &next].map(|f| validated(dataset, f));
+            let gain = count(&next.fit) * (left[0] / left[1]).ln();
+            let came = causes.iter().map(|cause| step(dataset, cause, [fitted, &next], gain)).collect();
             return Ok(Some((next, came)));
         }
         hypothesis = next.fit.hypothesis;
@@ -85,13 +96,13 @@ fn is_noise(dataset: &Dataset, fitted: &Fitted) -> bool {
     validated(dataset, fitted) <= (NOTHING_LEFT * floor(dataset, &fitted.fit)).powi(2)
 }
 
-/// One of the causes that came in together: what they gained, they gained together.
-fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2]) -> Accepted {
+/// One of the causes that came in together: what they gained, they gained together, in samples that were not fitted.
+fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2], gain: f64) -> Accepted {
     let balances = [before, after].map(|f| balance(dataset, &f.fit).map(f64::sqrt));
     Accepted {
         id: cause.id,
         origin: Origin::Discovered,
-        gain: count(&after.fit) * (mean_square(&before.fit) / mean_square(&after.fit)).ln(),
+        gain,
         rivals: Vec::new(),
         states: [before, after].map(|f| State::of(&f.fit)),
         confounded_with: Vec::new(),

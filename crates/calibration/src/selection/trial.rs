@@ -26,6 +26,8 @@ pub(super) const LEAST_VALIDATED_GAIN: f64 = 0.05;
 const LEAST_SHARE_OF_FLOOR: f64 = 0.5;
 /// A cause under which the energy balance leaves this many times the mean square is refuted.
 pub(super) const REFUTED: f64 = 1.5;
+/// A cause under which the energy balance leaves this share or less of what it leaves under a rival is told from that.
+pub(super) const BY_AMPLITUDE: f64 = 0.8;
 /// A residual within this factor of its white part, of which no candidate promises to take anything, is left alone.
 pub(super) const NOTHING_LEFT: f64 = 1.2;
 
@@ -123,7 +125,7 @@ pub(super) fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before {
     /// cross-validated mean square, rad²
-    pub(super) mean_square: f64,
+    mean_square: f64,
     least_removed: f64,
 }
 
@@ -131,6 +133,11 @@ impl Before {
     pub(super) fn of(dataset: &Dataset, fitted: &Fitted) -> Self {
         let least_removed = (LEAST_SHARE_OF_FLOOR * floor(dataset, &fitted.fit)).powi(2);
         Self { mean_square: validated(dataset, fitted), least_removed }
+    }
+
+    /// Whether no more is left.
+    pub(super) fn is_as_large_as(self, after: f64) -> bool {
+        after <= self.mean_square
     }
 
     /// Whether what is left after a step is less by enough to name what it added.

@@ -1,12 +1,12 @@
 //! Answers that are there: one is kept where it rests on the same bytes and this very program, and its files are as they were
 //! written.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use cvg_calibration::recording::Campaign;
+use cvg_calibration::recording::{Campaign, read_text};
 use cvg_calibration::report::{self, Tool};
 use serde_json::{Value, json};
 
@@ -40,10 +40,10 @@ pub(super) fn source(rows: Option<&Value>, report: &str, calibration: Option<&st
 /// The report that is there, where nothing that it rests on has changed and nothing of it is missing.
 pub(super) fn answer(own: &Path, campaign: &Campaign, rows: Option<&Value>) -> Option<Value> {
     let [facts, _, undone] = RESULTS;
-    let text = fs::read_to_string(own.join(facts)).ok()?;
-    let calibration = fs::read_to_string(own.join(undone)).ok();
+    let text = read_text(&own.join(facts)).ok()?;
+    let calibration = read_text(&own.join(undone)).ok();
     let expected = source(rows, &text, calibration.as_deref());
-    if fs::read_to_string(own.join(SOURCE)).ok()? != expected {
+    if read_text(&own.join(SOURCE)).ok()? != expected {
         return None;
     }
     let answer: Value = serde_json::from_str(&text).ok()?;
