@@ -101,6 +101,9 @@ fn a_line_that_the_stations_see_at_one_phase_does_not_swing_between_them() {
         let i = identified(sensor(vec![at(0.0, Role::Fit, seed), at(5.0, Role::Holdout, seed + 20)]));
         assert_eq!(i.report.status, Status::Answered, "seed {seed}");
         assert!(held_out(&i) < 0.06, "seed {seed}: {}°, {:#?}", held_out(&i), i.report.effects);
+        let line = i.report.effects.iter().find(|e| e.id == "table-harmonic").unwrap();
+        let told: Vec<_> = line.parameters.iter().map(|p| (p.name.as_str(), p.ci95.is_some())).collect();
+        assert_eq!(told, [("n", false), ("amplitude", true), ("phase", false)], "seed {seed}: {line:?}");
     }
 }
 

@@ -201,17 +201,16 @@ impl Described<'_> {
             let (c, s) = (side[first + 2 * i], side[first + 2 * i + 1]);
             let (dc, ds) = (d[first + 2 * i], d[first + 2 * i + 1]);
             let size = c.hypot(s).max(f64::MIN_POSITIVE);
+            // what stations at one phase see of a line is the least that it can be, and where it peaks they do not tell
+            let at_one_phase = self.model.table.at_one_phase[i];
+            let of_phase = if at_one_phase { f64::NAN } else { (s * dc).hypot(c * ds) / (size * size) };
             let p = vec![
                 parameter("n", "1", f64::from(*n), f64::NAN),
                 parameter("amplitude", "rad", size, (c * dc).hypot(s * ds) / size),
-                parameter(
-                    "phase",
-                    "deg",
-                    (-s).atan2(c).to_degrees(),
-                    ((s * dc).hypot(c * ds) / (size * size)).to_degrees(),
-                ),
+                parameter("phase", "deg", (-s).atan2(c).to_degrees(), of_phase.to_degrees()),
             ];
-            let evidence = format!("{n} per turn of the reference, beyond the table; {}", self.evidence());
+            let told = if at_one_phase { ", of which the stations tell one phase" } else { "" };
+            let evidence = format!("{n} per turn of the reference, beyond the table{told}; {}", self.evidence());
             effect(library_id(EffectId::TableHarmonic), Origin::Empirical, p, evidence)
         };
         shape.lines.iter().enumerate().map(line).collect()

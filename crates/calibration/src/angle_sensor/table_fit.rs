@@ -84,6 +84,8 @@ pub(crate) struct TableFit {
     pub(crate) side: Vec<f64>,
     /// constants by run; none where the run was not fitted
     pub(crate) constants: Vec<Option<f64>>,
+    /// which lines the samples meet at one phase only
+    pub(crate) at_one_phase: Vec<bool>,
     /// harmonics of an angle of period P are at n·`cycles`
     pub(crate) cycles: f64,
 }
@@ -189,6 +191,7 @@ impl TableFit {
             table: series(shape.form, &x[present + side..]),
             side: x[present..present + side].to_vec(),
             constants: column.iter().map(|c| c.map(|c| x[c])).collect(),
+            at_one_phase: phases.iter().map(Option::is_some).collect(),
             cycles,
         };
         let sound = x.iter().all(|v| v.is_finite()) && (!forward || fitted.table.is_invertible(cycles));
