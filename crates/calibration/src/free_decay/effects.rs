@@ -6,7 +6,7 @@ use super::fit::Fit;
 use super::model::Term;
 use super::report::{Finding, estimate, shown, whole, whole_raw};
 use super::runs::DecayRun;
-use super::selection::{Added, BELIEVED, is_declared};
+use super::selection::{Added, BELIEVED, is_declared, one_rate};
 use crate::data::track::wrapped;
 use crate::model::hypothesis::Origin;
 use crate::report::polar::polar;
@@ -28,12 +28,13 @@ pub(crate) fn name(term: Term) -> &'static str {
         Term::DampingGrowth => DAMPING_GROWTH,
         Term::GainRatio => EffectId::DetectionGainMismatch.description().id,
         Term::Skew => EffectId::DetectionSkew.description().id,
+        Term::Phase => EffectId::DetectionPhase.description().id,
     }
 }
 
 /// Those that were tried beside a term, with what they gained less.
 pub(crate) fn rivals(added: &Added) -> Vec<Rival> {
-    added.rivals.iter().map(|(t, gain)| Rival { id: name(*t).into(), beaten_by: added.gain - gain }).collect()
+    added.rivals.iter().map(|r| Rival { id: name(r.term).into(), beaten_by: added.gain - r.gain }).collect()
 }
 
 /// All effects of a finding.
@@ -54,10 +55,12 @@ pub(crate) fn effects(finding: &Finding, runs: &[DecayRun]) -> Vec<EffectReport>
         let parameter = &EffectId::DetectionGainMismatch.description().parameters[0];
         out.push(plain(finding, Term::GainRatio, vec![entry(parameter.name, parameter.unit, ratio)], runs));
     }
-    if model.has(Term::Skew) {
-        let parameter = &EffectId::DetectionSkew.description().parameters[0];
-        let value = entry(parameter.name, parameter.unit, estimate(fit, Term::Skew));
-        out.push(plain(finding, Term::Skew, vec![value], runs));
+    for (term, id) in [(Term::Skew, EffectId::DetectionSkew), (Term::Phase, EffectId::DetectionPhase)] {
+        if model.has(term) {
+            let parameter = &id.description().parameters[0];
+            let value = entry(parameter.name, parameter.unit, estimate(fit, term));
+            out.push(plain(finding, term, vec![value], runs));
+        }
     }
     if model.has(Term::Spring) {
         let mut parameters = vec![entry("c", "rad/s/V^2", estimate(fit, Term::Spring))];
@@ -139,7 +142,12 @@ fn plain(finding: &Finding, term: Term, parameters: Vec<ParameterReport>, runs: 
         rms(whole_raw(runs, &finding.fit).size().rms_deg),
     );
     let confounded: Vec<String> =
-        added.map(|a| a.not_ruled_out().map(|t| name(t).to_owned()).collect()).unwrap_or_default();
+        finding.instead.iter().filter(|other| other.of == term).map(|other| name(other.by).to_owned()).collect();
+    let separated_by = if term.is_readout() && one_rate(runs) {
+        "decays at another rate"
+    } else {
+        "decays at several starting angles, and of several amplitudes"
+    };
     EffectReport {
         id: name(term).into(),
         origin: match term {
@@ -151,8 +159,7 @@ fn plain(finding: &Finding, term: Term, parameters: Vec<ParameterReport>, runs: 
         heldout_rms_deg: (!is_declared(term))
             .then(|| BeforeAfter { before: errors.declared.size().rms_deg, after: errors.after.size().rms_deg }),
         evidence,
-        separated_by: (!confounded.is_empty())
-            .then(|| "decays at several starting angles, and of several amplitudes".to_owned()),
+        separated_by: (!confounded.is_empty()).then(|| separated_by.to_owned()),
         confounded_with: confounded,
     }
 }

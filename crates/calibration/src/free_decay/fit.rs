@@ -51,6 +51,21 @@ impl Fit {
         self
     }
 
+    /// The same, with intervals that also hold a term that was not seen.
+    pub(crate) fn beside(mut self, unseen: &Unseen) -> Self {
+        self.covariance += &unseen.by * unseen.by.transpose() * (unseen.size * unseen.size);
+        self
+    }
+
+    /// The same, with intervals that also hold what another explanation says of the terms that both have. A term that
+    /// the other does not have is absent in it.
+    pub(crate) fn or(mut self, other: &Model) -> Self {
+        let off = self.model.terms.iter().zip(&self.model.values).map(|(t, v)| other.value(*t) - v);
+        let off = DVector::from_iterator(self.model.terms.len(), off);
+        self.covariance += &off * off.transpose();
+        self
+    }
+
     pub(crate) fn deviation(&self, term: Term) -> f64 {
         let at = self.model.terms.iter().position(|t| *t == term);
         at.map_or(0.0, |at| self.covariance[(at, at)].max(0.0).sqrt())
@@ -249,7 +264,7 @@ fn nudge(term: Term, run: &DecayRun, start: &Start) -> f64 {
     let duration = run.duration_s().max(f64::MIN_POSITIVE);
     match term {
         Term::Spring | Term::DampingGrowth => NUDGE / (duration * energy),
-        Term::GainRatio | Term::Skew => NUDGE,
+        Term::GainRatio | Term::Skew | Term::Phase => NUDGE,
         Term::AngularGain => NUDGE / (duration * run.mean_rate().abs().max(1e-9)),
         _ => NUDGE / duration,
     }
@@ -312,6 +327,36 @@ pub(crate) fn fit(model: &Model, starts: &[Start], data: Data<'_>) -> Fit {
         model,
         starts,
     }
+}
+
+/// What a term that a fit does not have may be, as far as the data allow it, and what it would do to the values.
+#[derive(Debug, Clone)]
+pub(crate) struct Unseen {
+    /// root mean square of what it may be
+    pub(crate) size: f64,
+    /// change of the values of the model's terms by a unit of it
+    pub(crate) by: DVector<f64>,
+}
+
+/// A term that was not added, by one linearisation: its likelihood, and all values within `bound` as likely before.
+pub(crate) fn unseen(fitted: &Fit, term: Term, bound: f64, data: Data<'_>) -> Option<Unseen> {
+    let white = || Autoregression::white(1.0);
+    let mut fitting = Fitting { data, noise: [white(), white(), white()], aside: fitted.set_aside.clone() };
+    fitting.weigh(&fitted.model, &fitted.starts, true);
+    let shared = fitted.model.terms.len();
+    let (matrix, right) = fitting.equations(&fitted.model.with(term), &fitted.starts);
+    let rest = |i: usize| i + usize::from(i >= shared);
+    let n = matrix.nrows() - 1;
+    let of_rest = DMatrix::from_fn(n, n, |i, j| matrix[(rest(i), rest(j))]);
+    let along = DVector::from_fn(n, |i, _| matrix[(rest(i), shared)]);
+    // the values take up what of the term they can
+    let taken = solved(&of_rest, &along, 0.0)?;
+    let own = (matrix[(shared, shared)] - along.dot(&taken)).max(0.0);
+    let left = right[shared] - taken.dot(&DVector::from_fn(n, |i, _| right[rest(i)]));
+    // even between the bounds
+    let precision = own + 3.0 / (bound * bound);
+    let size = (left / precision).hypot(precision.sqrt().recip());
+    Some(Unseen { size, by: taken.rows(0, shared).into_owned() })
 }
 
 /// Follows a model from the beginning of each run further and further on, so that what beats is never off by a cycle.

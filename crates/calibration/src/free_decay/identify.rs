@@ -4,11 +4,11 @@
 use super::agreement::{Verdict, verdict};
 use super::errors::{Part, after, raw};
 use super::fit::{Data, Fit, fit};
-use super::model::Start;
+use super::model::{Start, Term};
 use super::phase::phase;
 use super::report::{Errors, Finding, report};
 use super::runs::DecayRun;
-use super::selection::{Chosen, choose, is_declared, is_sound};
+use super::selection::{Chosen, choose, instead, is_declared, is_sound, unseen_phase};
 use crate::error::Refusal;
 use crate::identification::{Identification, Options, run_report};
 use crate::recording::{Campaign, RunKind};
@@ -129,12 +129,19 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         let of_all = if held.is_empty() { fit(&f.model, &f.starts, all) } else { f.clone() };
         of_all.widened(times_as_wide)
     };
-    let final_fit = of_all(&chosen.discovered);
+    let mut final_fit = of_all(&chosen.discovered);
     sound(&final_fit, &head.device)?;
+    (options.progress)("fitting what explains the decays as well");
+    let instead = instead(&chosen.added, &final_fit, all);
+    // where a phase explains them as well by itself, what lies between is held by that
+    let is_held = !chosen.many_angles || instead.iter().any(|other| other.by == Term::Phase);
+    let unseen = if is_held { None } else { unseen_phase(&final_fit, all) };
+    final_fit = instead.iter().fold(final_fit, |f, other| f.or(&other.model));
+    final_fit = unseen.iter().fold(final_fit, Fit::beside);
     let final_declared =
         if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };
     let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
-    let finding = Finding { chosen, fit: final_fit, declared: final_declared, phase, errors };
+    let finding = Finding { chosen, fit: final_fit, declared: final_declared, instead, unseen, phase, errors };
     report(head, &finding, &fitted, &held, with_plots)
 }
 

@@ -30,6 +30,15 @@ pub(crate) enum Term {
     GainRatio,
     /// s
     Skew,
+    /// φ_y − φ_x between the channels, rad: of one that is sampled later than the other
+    Phase,
+}
+
+impl Term {
+    /// Whether it is of the readout: what the channels make of the orbit, and nothing of its motion.
+    pub(crate) fn is_readout(self) -> bool {
+        matches!(self, Self::GainRatio | Self::Skew | Self::Phase)
+    }
 }
 
 /// Terms with their values; terms that are not there are 0.
@@ -55,6 +64,15 @@ impl Model {
         more.terms.push(term);
         more.values.push(0.0);
         more
+    }
+
+    /// The same with another term in the place of one, absent yet; at the end, as a term that is added.
+    pub(crate) fn exchanged(&self, term: Term, other: Term) -> Self {
+        let mut rest = self.clone();
+        let kept = || self.terms.iter().zip(&self.values).filter(|(t, _)| **t != term);
+        rest.terms = kept().map(|(t, _)| *t).collect();
+        rest.values = kept().map(|(_, v)| *v).collect();
+        rest.with(other)
     }
 
     pub(crate) fn has(&self, term: Term) -> bool {
@@ -91,8 +109,9 @@ impl Model {
     /// What the first `count` samples of a run show if it began so. Linear mechanics exactly, nonlinear ones in between
     /// (Strang), which is exact as far as they commute: to 2e-4 of themselves where either turns the orbit by 2° a sample.
     pub(crate) fn predict(&self, run: &DecayRun, start: &Start, count: usize) -> Vec<State> {
-        let readout = (self.has(Term::GainRatio) || self.has(Term::Skew))
-            .then(|| stokes::readout(1.0 + self.value(Term::GainRatio), self.value(Term::Skew)));
+        let readout = self.terms.iter().any(|t| t.is_readout()).then(|| {
+            stokes::readout(1.0 + self.value(Term::GainRatio), self.value(Term::Skew), self.value(Term::Phase))
+        });
         let mut step: Option<Step> = None;
         let mut u = pure(start);
         let mut out = Vec::with_capacity(count);

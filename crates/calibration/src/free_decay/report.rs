@@ -2,14 +2,14 @@
 
 use cvg_model::effects::{EffectId, Shown};
 
-use super::effects::effects;
+use super::effects::{effects, name};
 use super::errors::{Part, after, in_volts, raw};
-use super::fit::Fit;
+use super::fit::{Fit, Unseen};
 use super::identify::Head;
 use super::model::Term;
 use super::phase::Phase;
 use super::runs::DecayRun;
-use super::selection::Chosen;
+use super::selection::{Chosen, Instead, one_rate};
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::plots_of;
 use crate::diagnostics::residual::{
@@ -59,6 +59,10 @@ pub(crate) struct Finding {
     pub(crate) fit: Fit,
     /// the paper's terms alone, on the same
     pub(crate) declared: Fit,
+    /// what explains the decays as well as a term that was chosen; the intervals hold it
+    pub(crate) instead: Vec<Instead>,
+    /// the phase between the channels that may be there although nothing shows it; the intervals hold it
+    pub(crate) unseen: Option<Unseen>,
     pub(crate) phase: Option<Phase>,
     pub(crate) errors: Errors,
 }
@@ -67,6 +71,8 @@ pub(crate) struct Finding {
 const CURVE_POINTS: usize = 2000;
 /// Seconds of an hour, and degrees per hour of a rad/s.
 const SECONDS_PER_HOUR: f64 = 3600.0;
+/// rad
+const MRAD: f64 = 1e-3;
 
 /// Reports.
 ///
@@ -218,6 +224,15 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
             (2.0 * finding.fit.model.axis_rad).cos()
         ));
     }
+    for other in &finding.instead {
+        out.push(format!(
+            "{} explains these decays as well as {} of {:.3e}: the intervals hold both, and decays at another rate would tell",
+            format_args!("{} of {:.3e}", name(other.by), other.model.value(other.by)),
+            name(other.of),
+            finding.fit.model.value(other.of)
+        ));
+    }
+    out.extend(unseen(finding, fitted));
     if finding.fit.model.has(Term::Precession) {
         let known = fitted.iter().any(|r| r.rate_is_known);
         let why = if known { "the input rate is zero" } else { "the input rate is not stated" };
@@ -249,6 +264,24 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
     out
 }
 
+/// What a phase between the channels would do that nothing shows where all decays are at one rate.
+fn unseen(finding: &Finding, runs: &[DecayRun]) -> Option<String> {
+    let (unseen, model) = (finding.unseen.as_ref().filter(|_| one_rate(runs))?, &finding.fit.model);
+    let at = |term: Term| model.terms.iter().position(|t| *t == term).map_or(0.0, |at| unseen.by[at]);
+    let turning = if model.has(Term::AngularGain) { Term::AngularGain } else { Term::Precession };
+    let percent = |of: f64, by: f64| 100.0 * MRAD * by / of;
+    let [along, across] = [Term::SplitAlong, Term::SplitAcross].map(|t| (model.value(t), at(t)));
+    let split = along.0.hypot(across.0);
+    Some(format!(
+        "all decays are at one rate, where a phase between the channels is hardly told from other mechanics: 1 mrad of it, \
+         unseen, would make the precession {:+.2} % and the split {:+.2} % larger; the decays leave room for {:.3} mrad, \
+         which the intervals hold, and decays at another rate would tell it",
+        percent(model.value(turning), at(turning)),
+        percent(split, (along.0 * along.1 + across.0 * across.1) / split),
+        unseen.size / MRAD,
+    ))
+}
+
 fn hypothesis(finding: &Finding, head: &Head) -> Hypothesis {
     let model = &finding.fit.model;
     let gain =
@@ -267,6 +300,9 @@ fn hypothesis(finding: &Finding, head: &Head) -> Hypothesis {
     }
     if model.has(Term::Skew) {
         add(EffectId::DetectionSkew, [model.value(Term::Skew), 0.0, 0.0, 0.0], Origin::Discovered);
+    }
+    if model.has(Term::Phase) {
+        add(EffectId::DetectionPhase, [model.value(Term::Phase), 0.0, 0.0, 0.0], Origin::Discovered);
     }
     if model.has(Term::GainRatio) {
         let g = 1.0 + model.value(Term::GainRatio);

@@ -1,7 +1,9 @@
 //! Which terms the decays ask for: the paper's, as far as the pattern's angles tell them apart, and beyond them what the
 //! likelihood pays for.
 
-use super::fit::{Data, Fit, approach, fit};
+use cvg_model::effects::EffectId;
+
+use super::fit::{Data, Fit, Unseen, approach, fit, unseen};
 use super::model::{Model, Term};
 use super::runs::DecayRun;
 use super::start::{begun, energy};
@@ -13,6 +15,18 @@ const SPREAD: f64 = 0.02;
 pub(crate) const BELIEVED: f64 = 10.0;
 /// A rival that gains as much less than this is not ruled out.
 const RULED_OUT: f64 = 10.0;
+/// Rates that differ by no more than this share of the largest are one.
+const ONE_RATE: f64 = 0.05;
+
+/// Another term that was tried beside one that was added.
+#[derive(Debug, Clone)]
+pub(crate) struct Tried {
+    pub(crate) term: Term,
+    /// gain in 2 ln likelihood after its price
+    pub(crate) gain: f64,
+    /// the model with it in the place of the one that was added, as it was fitted
+    model: Model,
+}
 
 /// A term that was added, with what speaks for it.
 #[derive(Debug, Clone)]
@@ -20,15 +34,50 @@ pub(crate) struct Added {
     pub(crate) term: Term,
     /// gain in 2 ln likelihood after its price
     pub(crate) gain: f64,
-    /// the other terms that were tried, with theirs
-    pub(crate) rivals: Vec<(Term, f64)>,
+    pub(crate) rivals: Vec<Tried>,
 }
 
 impl Added {
     /// Rivals that explain the decays nearly as well.
-    pub(crate) fn not_ruled_out(&self) -> impl Iterator<Item = Term> + '_ {
-        self.rivals.iter().filter(|(_, gain)| *gain > BELIEVED && self.gain - gain < RULED_OUT).map(|(t, _)| *t)
+    pub(crate) fn not_ruled_out(&self) -> impl Iterator<Item = &Tried> + '_ {
+        let best = self.rivals.iter().map(|r| r.gain).fold(self.gain, f64::max);
+        self.rivals.iter().filter(move |r| r.gain > BELIEVED && best - r.gain < RULED_OUT)
     }
+}
+
+/// Another explanation of what a term explains, fitted in its place.
+#[derive(Debug, Clone)]
+pub(crate) struct Instead {
+    pub(crate) of: Term,
+    pub(crate) by: Term,
+    pub(crate) model: Model,
+}
+
+/// Fits every rival that is not ruled out in the place of the term it rivals: those that follow all the data as well.
+pub(crate) fn instead(added: &[Added], fitted: &Fit, data: Data<'_>) -> Vec<Instead> {
+    let rivals = added.iter().flat_map(|a| a.not_ruled_out().map(|r| (a.term, r)));
+    rivals
+        .filter(|(of, r)| fitted.model.has(*of) && !fitted.model.has(r.term))
+        .filter_map(|(of, rival)| {
+            let mut model = fitted.model.exchanged(of, rival.term);
+            for (term, value) in model.terms.iter().zip(&mut model.values) {
+                if rival.model.has(*term) {
+                    *value = rival.model.value(*term);
+                }
+            }
+            let other = fit(&model, &fitted.starts, data);
+            let as_well = other.minus_two_log - fitted.minus_two_log < RULED_OUT;
+            (is_sound(&other) && as_well).then(|| Instead { of, by: rival.term, model: other.model })
+        })
+        .collect()
+}
+
+/// Whether all decays turn at one rate, where what the readout does to the orbit passes for other mechanics: of all
+/// readouts only one trace shows there.
+pub(crate) fn one_rate(runs: &[DecayRun]) -> bool {
+    let (least, most) =
+        runs.iter().map(DecayRun::mean_rate).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), r| (a.min(r), b.max(r)));
+    most - least <= ONE_RATE * most.abs().max(least.abs())
 }
 
 /// What was chosen.
@@ -45,7 +94,7 @@ pub(crate) struct Chosen {
 
 /// A term of the paper's model.
 pub(crate) fn is_declared(term: Term) -> bool {
-    !matches!(term, Term::Spring | Term::DampingGrowth | Term::Skew)
+    !matches!(term, Term::Spring | Term::DampingGrowth | Term::Skew | Term::Phase)
 }
 
 /// How far the pattern is spread, 1 − |mean e^{2iθ}|², and its mean angle, rad.
@@ -98,9 +147,15 @@ pub(crate) fn choose(data: Data<'_>, discover: bool, progress: &dyn Fn(&str)) ->
             .filter(|(more, ..)| is_sound(more))
             .collect();
         tried.sort_by(|a, b| b.2.total_cmp(&a.2));
-        let Some((more, term, gain)) = tried.first().cloned().filter(|t| t.2 > BELIEVED) else { break };
+        let of_use = |(_, term, gain): &(Fit, Term, f64)| *gain > BELIEVED && (discover || is_declared(*term));
+        let Some(most) = tried.iter().position(of_use) else { break };
+        // of what explains the decays as well, the paper's term
+        let enough = tried[most].2 - RULED_OUT;
+        let at = tried.iter().position(|t| of_use(t) && is_declared(t.1) && t.2 > enough).unwrap_or(most);
+        let (more, term, gain) = tried.remove(at);
         progress(&format!("{term:?}: gain {gain:.0} in 2 ln likelihood"));
-        added.push(Added { term, gain, rivals: tried.iter().skip(1).map(|t| (t.1, t.2)).collect() });
+        let rivals = tried.into_iter().map(|(f, term, gain)| Tried { term, gain, model: f.model }).collect();
+        added.push(Added { term, gain, rivals });
         best = more;
     }
     let declared = if added.iter().all(|a| is_declared(a.term)) {
@@ -114,20 +169,45 @@ pub(crate) fn choose(data: Data<'_>, discover: bool, progress: &dyn Fn(&str)) ->
     Chosen { declared, discovered: best, added, many_angles }
 }
 
-/// What may be there beside the terms that always are.
+/// What may be there beside the terms that always are. What else the readout can be is tried where nothing is to be
+/// discovered too: it rivals the ratio of the gains.
 fn candidates(many_angles: bool, discover: bool) -> Vec<Term> {
-    let mut out = if many_angles { vec![Term::GainRatio] } else { vec![Term::SplitAlong] };
+    let mut out = if many_angles { vec![Term::GainRatio, Term::Skew, Term::Phase] } else { vec![Term::SplitAlong] };
     if discover {
         out.extend([Term::Spring, Term::DampingGrowth]);
-        if many_angles {
-            out.push(Term::Skew);
-        }
     }
     out
 }
 
-/// A fit whose numbers are numbers.
+/// The parameter of the library that a term of the readout is, less the value at which it is absent.
+fn bounds(term: Term) -> Option<[f64; 2]> {
+    let id = match term {
+        Term::GainRatio => EffectId::DetectionGainMismatch,
+        Term::Skew => EffectId::DetectionSkew,
+        Term::Phase => EffectId::DetectionPhase,
+        _ => return None,
+    };
+    let of = &id.description().parameters[0];
+    Some([of.lower - of.neutral, of.upper - of.neutral])
+}
+
+/// A readout that the library knows: gains, an axis and a phase within its bounds.
+fn is_possible(model: &Model) -> bool {
+    let within = |(term, value): (&Term, &f64)| bounds(*term).is_none_or(|[low, high]| (low..=high).contains(value));
+    model.terms.iter().zip(&model.values).all(within)
+}
+
+/// A phase between the channels that is not in a fit. At one rate it turns the orbit's motion into that of other
+/// mechanics but for a trace, so that the intervals have to hold what of it the trace allows.
+pub(crate) fn unseen_phase(fitted: &Fit, data: Data<'_>) -> Option<Unseen> {
+    let [_, bound] = bounds(Term::Phase).filter(|_| !fitted.model.has(Term::Phase))?;
+    unseen(fitted, Term::Phase, bound, data)
+}
+
+/// A fit whose numbers are numbers, of a readout that can be.
 pub(crate) fn is_sound(fit: &Fit) -> bool {
     let numbers = fit.model.values.iter().chain(fit.starts.iter().flatten());
-    numbers.chain(fit.covariance.iter()).all(|v| v.is_finite()) && fit.minus_two_log.is_finite()
+    numbers.chain(fit.covariance.iter()).all(|v| v.is_finite())
+        && fit.minus_two_log.is_finite()
+        && is_possible(&fit.model)
 }

@@ -1,7 +1,7 @@
 //! Where a fit begins: the equations of (E, R, S, Q) are linear in what is sought, and their integrals over a stretch of
 //! the recording need no derivatives of it. Least squares then give values near enough to fit from.
 
-use super::model::{Model, Term};
+use super::model::Model;
 use super::runs::DecayRun;
 use super::stokes::{Mechanics, State};
 use crate::estimation::linear::NormalEquations;
@@ -11,8 +11,7 @@ const COVERED: usize = 12;
 
 /// The values of a model's terms from the first `count` samples of each run; readout terms are left as they are.
 pub(crate) fn begun(model: &Model, runs: &[DecayRun], count: impl Fn(&DecayRun) -> usize) -> Model {
-    let sought: Vec<usize> =
-        (0..model.terms.len()).filter(|&at| !matches!(model.terms[at], Term::GainRatio | Term::Skew)).collect();
+    let sought: Vec<usize> = (0..model.terms.len()).filter(|&at| !model.terms[at].is_readout()).collect();
     let mut equations = NormalEquations::new(sought.len());
     for run in runs {
         let n = count(run).min(run.len());

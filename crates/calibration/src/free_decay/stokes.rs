@@ -99,12 +99,13 @@ impl Mechanics {
     }
 }
 
-/// What unequal gains and an oblique axis make of (E, R, S, Q).
-pub(crate) fn readout(gain_ratio: f64, skew: f64) -> Matrix4<f64> {
+/// What unequal gains, an oblique axis and a phase between the channels make of (E, R, S, Q).
+pub(crate) fn readout(gain_ratio: f64, skew: f64, phase_rad: f64) -> Matrix4<f64> {
     let now = Moment::default();
     matrix(|e| {
         let skewed = EffectId::DetectionSkew.read(&[skew, 0.0, 0.0, 0.0], *e, &now);
-        of(&EffectId::DetectionGainMismatch.read(&[gain_ratio, 0.0, 0.0, 0.0], skewed, &now))
+        let scaled = EffectId::DetectionGainMismatch.read(&[gain_ratio, 0.0, 0.0, 0.0], skewed, &now);
+        of(&EffectId::DetectionPhase.read(&[phase_rad, 0.0, 0.0, 0.0], scaled, &now))
     })
 }
 
@@ -176,7 +177,9 @@ mod tests {
     #[test]
     fn a_readout_acts_on_states_as_on_envelopes() {
         let e = Envelope::new(0.3, -0.2, 0.7, 0.4);
-        let read = Envelope::new(0.3, -0.2, 1.02 * (0.7 + 0.05 * 0.3), 1.02 * (0.4 - 0.05 * 0.2));
-        assert!((readout(1.02, 0.05) * of(&e) - of(&read)).norm() < 1e-12);
+        let (y_c, y_s) = (1.02 * (0.7 + 0.05 * 0.3), 1.02 * (0.4 - 0.05 * 0.2));
+        let (sin, cos) = 0.24f64.sin_cos();
+        let late = Envelope::new(0.3, -0.2, y_c * cos - y_s * sin, y_s * cos + y_c * sin);
+        assert!((readout(1.02, 0.05, 0.24) * of(&e) - of(&late)).norm() < 1e-12);
     }
 }

@@ -42,6 +42,8 @@ pub(crate) struct Ring {
     pub(crate) ahead_rad_s: f64,
     /// G_Dy/G_Dx
     pub(crate) gain_ratio: f64,
+    /// phase that Y lags X by, rad: of a channel that is sampled late
+    pub(crate) phase_rad: f64,
     pub(crate) noise_v: f64,
     /// share of the last row's noise in the next one's
     pub(crate) memory: f64,
@@ -66,6 +68,7 @@ impl Ring {
             frequency_per_energy: 0.0,
             ahead_rad_s: 0.3,
             gain_ratio: 1.0,
+            phase_rad: 0.0,
             noise_v: 1e-3,
             memory: 0.0,
             row_s: 0.05,
@@ -94,8 +97,10 @@ impl Ring {
                 }
                 let own = (1.0 - self.memory * self.memory).sqrt() * self.noise_v;
                 last = last.map(|l| self.memory * l + own * noise.normal());
-                let g = self.gain_ratio;
-                let seen = Envelope::new(e.x_c + last[0], e.x_s + last[1], g * e.y_c + last[2], g * e.y_s + last[3]);
+                // Y = y_c − i y_s, turned back by the phase
+                let (sin, cos) = self.phase_rad.sin_cos();
+                let y = [e.y_c * cos - e.y_s * sin, e.y_s * cos + e.y_c * sin].map(|v| self.gain_ratio * v);
+                let seen = Envelope::new(e.x_c + last[0], e.x_s + last[1], y[0] + last[2], y[1] + last[3]);
                 (i as f64 * self.row_s, seen)
             })
             .collect()
@@ -112,11 +117,35 @@ impl Ring {
 
     /// Writes decays at these angles, and the campaign of them, with `of_each` in each run's table.
     pub(crate) fn campaign(&self, folder: &Path, angles_deg: &[f64], of_each: &str, seed: u64) -> std::path::PathBuf {
+        self.written(folder, angles_deg, |_| (self.rate_dps, of_each.to_owned()), seed)
+    }
+
+    /// The same, of which one decay after the other turns at one of these rates, which are stated.
+    pub(crate) fn campaign_at(
+        &self,
+        folder: &Path,
+        angles_deg: &[f64],
+        rates_dps: &[f64],
+        seed: u64,
+    ) -> std::path::PathBuf {
+        let of = |at: usize| rates_dps[at % rates_dps.len()];
+        self.written(folder, angles_deg, |at| (of(at), format!("rate_dps = {:?}", of(at))), seed)
+    }
+
+    /// Decays, each at a rate and with what the campaign says of it.
+    fn written(
+        &self,
+        folder: &Path,
+        angles_deg: &[f64],
+        of_each: impl Fn(usize) -> (f64, String),
+        seed: u64,
+    ) -> std::path::PathBuf {
         let mut noise = Noise::new(seed);
         let mut campaign = "[campaign]\ndevice = \"ring\"\n".to_owned();
         for (at, angle) in angles_deg.iter().enumerate() {
             let mut text = "t_s,xc_v,xs_v,yc_v,ys_v\n".to_owned();
-            for (t, e) in self.decay(1.0, *angle, &mut noise) {
+            let (rate_dps, of_each) = of_each(at);
+            for (t, e) in (Self { rate_dps, ..self.clone() }).decay(1.0, *angle, &mut noise) {
                 let _ = writeln!(text, "{t:.4},{:.9},{:.9},{:.9},{:.9}", e.x_c, e.x_s, e.y_c, e.y_s);
             }
             std::fs::write(folder.join(format!("decay-{at}.csv")), text).expect("a folder of the test's own");
