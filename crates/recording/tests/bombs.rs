@@ -130,6 +130,18 @@ fn a_matlab_struct_that_unfolds_to_more_than_is_allowed_is_refused() {
 }
 
 #[test]
+fn a_matlab_file_is_refused_by_the_beginning_of_an_array_before_that_is_unfolded() {
+    // as bytes it is allowed twice over, and not as numbers; only its beginning is there to be unfolded
+    let mut stored = ZlibEncoder::new(vec![], Compression::none());
+    stored.write_all(&zeros("t_s", MANY / 4)).unwrap();
+    let mut stored = stored.finish().unwrap();
+    stored.truncate(4096);
+    let array =
+        [&15_u32.to_le_bytes(), &u32::try_from(stored.len()).unwrap().to_le_bytes(), stored.as_slice()].concat();
+    assert_too_large(read(&mat_5(&[array])));
+}
+
+#[test]
 fn a_folded_matlab_file_of_few_numbers_is_read() {
     let recording = read(&mat_5(&[folded_zeros("t_s", 3), folded_zeros("theta_deg", 3)])).unwrap();
     assert_eq!((recording.t_s, recording.theta_deg), (vec![0.0], Some(vec![0.0])));

@@ -38,6 +38,8 @@ const COMPRESSED: u32 = 15;
 const FLAGS_AT: usize = 8 + 8;
 /// Where an array's size stands in it: after its own tag, its flags and the tag of the size.
 const SIZE_AT: usize = 8 + 16;
+/// Bytes at the beginning of a compressed array that say how much it is: a size of some sixty dimensions is in them.
+const TOLD_BY: u64 = 288;
 
 /// The same file with nothing compressed. Deflate unfolds a byte to a thousand, and MATLAB stores numbers in as few
 /// bytes as they need: what all that takes is asked before it is there.
@@ -47,6 +49,20 @@ fn unfolded(bytes: &[u8], source: &Path) -> Result<Vec<u8>, ReadError> {
     let word = |bytes: &[u8], at: usize| -> Option<u32> {
         let word: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
         Some(if is_big { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
+    };
+    // numbers that an array of so many bytes says it has, by its beginning
+    let values = |array: &[u8], length: u64| -> u64 {
+        let dimensions = word(array, SIZE_AT + 4).unwrap_or(0) as usize / 4;
+        let size = |d: usize| word(array, SIZE_AT + 8 + 4 * d).map_or(u64::MAX, u64::from);
+        let sizes = (0..dimensions.min(array.len() / 4)).map(size);
+        // a struct says how many structs it is; of the numbers in it, a byte each is the least
+        let is_struct = word(array, FLAGS_AT).is_some_and(|flags| flags & 0xff == structs::STRUCT);
+        let values = if is_struct { u64::MAX } else { sizes.fold(1_u64, u64::saturating_mul) };
+        values.min(length)
+    };
+    // the array is held twice while it is decoded
+    let held = |array: &[u8], length: u64| {
+        length.saturating_mul(2).saturating_add(values(array, length).saturating_mul(PER_NUMBER))
     };
     let mut out = head.to_vec();
     let mut needed = 0_u64;
@@ -58,13 +74,15 @@ fn unfolded(bytes: &[u8], source: &Path) -> Result<Vec<u8>, ReadError> {
         if kind == COMPRESSED {
             let say = |error: std::io::Error| refuse(source, KIND, error.to_string());
             let folded = ZlibDecoder::new(&body[..length]);
-            let mut tag = Vec::new();
-            let mut folded = folded.take(8);
-            folded.read_to_end(&mut tag).map_err(say)?;
-            let stated = word(&tag, 4).map_or(0, u64::from);
-            memory::allow(needed.saturating_add(2 * stated), "its arrays", source)?;
-            out.append(&mut tag);
-            folded.set_limit(stated);
+            let mut head = Vec::new();
+            let mut folded = folded.take(TOLD_BY);
+            folded.read_to_end(&mut head).map_err(say)?;
+            let stated = word(&head, 4).map_or(0, |length| 8 + u64::from(length));
+            // before it is unfolded, by what its beginning says
+            memory::allow(needed.saturating_add(held(&head, stated)), "its arrays", source)?;
+            head.truncate(usize::try_from(stated).unwrap_or(usize::MAX));
+            folded.set_limit(stated - head.len() as u64);
+            out.append(&mut head);
             folded.read_to_end(&mut out).map_err(say)?;
             at += 8 + length;
         } else {
@@ -73,14 +91,7 @@ fn unfolded(bytes: &[u8], source: &Path) -> Result<Vec<u8>, ReadError> {
             at += 8 + padded;
         }
         let array = &out[begins..];
-        let dimensions = word(array, SIZE_AT + 4).unwrap_or(0) as usize / 4;
-        let sizes =
-            (0..dimensions.min(array.len() / 4)).map(|d| u64::from(word(array, SIZE_AT + 8 + 4 * d).unwrap_or(0)));
-        // a struct says how many structs it is; of the numbers in it, a byte each is the least
-        let is_struct = word(array, FLAGS_AT).is_some_and(|flags| flags & 0xff == structs::STRUCT);
-        let values = if is_struct { u64::MAX } else { sizes.fold(1_u64, u64::saturating_mul) };
-        let values = values.min(array.len() as u64);
-        needed = needed.saturating_add(2 * array.len() as u64).saturating_add(values.saturating_mul(PER_NUMBER));
+        needed = needed.saturating_add(held(array, array.len() as u64));
         memory::allow(needed, "its arrays", source)?;
     }
     Ok(out)
