@@ -21,7 +21,9 @@ fn ring(seed: u64, keys: &str, of_each: &str) -> String {
     );
     for at in 0..8 {
         let start = 22.5 * f64::from(at);
-        let _ = write!(text, "[[run]]\nkind = \"decay\"\nstart_deg = {start}\nrate_dps = 10.0\n");
+        // this way and that: at one rate nothing tells what the readout does to the orbit from mechanics
+        let rate = if at % 2 == 0 { 10.0 } else { -10.0 };
+        let _ = write!(text, "[[run]]\nkind = \"decay\"\nstart_deg = {start}\nrate_dps = {rate:?}\n");
         let _ = writeln!(text, "{}", of_each.replace('#', &at.to_string()));
     }
     text

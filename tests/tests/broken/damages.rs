@@ -66,6 +66,7 @@ pub(crate) const DAMAGES: &[Damage] = &[
     alone("eight bits", eight_bits),
     beside("an offset of a channel", offset),
     alone("rates of another moment", delayed_rate),
+    alone("a bit that hangs", hanging_bit),
 ];
 
 const fn alone(name: &'static str, of: fn(&Made, &mut Draws) -> Recording) -> Damage {
@@ -433,5 +434,20 @@ fn offset(made: &Made, draw: &mut Draws) -> Recording {
     let mut recording = made.recording();
     let by = share(draw, 1e-3, 0.1);
     either(&mut recording, draw).iter_mut().for_each(|v| *v += by);
+    recording
+}
+
+/// A converter of sixteen bits of which one of the upper ones is always set, or never.
+fn hanging_bit(made: &Made, draw: &mut Draws) -> Recording {
+    let mut recording = made.recording();
+    let (range, bit, is_set) = (draw.between(1.05, 4.0), 15 - draw.below(6), draw.below(2) == 0);
+    let level = 2.0 * range / 65_536.0;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a code of the converter")]
+    let hung = |v: f64| {
+        let code = ((v + range) / level).clamp(0.0, 65_535.0) as u32;
+        let code = if is_set { code | 1 << bit } else { code & !(1 << bit) };
+        (f64::from(code) + 0.5) * level - range
+    };
+    either(&mut recording, draw).iter_mut().for_each(|v| *v = hung(*v));
     recording
 }

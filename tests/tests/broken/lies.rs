@@ -16,6 +16,15 @@ const LIES: f64 = 1e-3;
 /// An interval that is narrower than this is none of a measurement.
 const NARROWEST: f64 = 1e-9;
 
+/// What a report says of a sound campaign as well: of what it has no runs for, and not of what is wrong with those it has.
+const ROUTINE: &[&str] = &[
+    "the campaign cannot tell the",
+    "is confounded with",
+    "the reference was commanded and not measured",
+    "are told apart by a run that no other bears out",
+    "samples were set aside as spikes",
+];
+
 /// Rows of a run: more of them take longer and show no more.
 const MOST_ROWS: f64 = 4000.0;
 
@@ -114,7 +123,7 @@ fn outcome(number: u64) -> Outcome {
             let r = &identified.report;
             let ratio = r.detection_gain_ratio;
             let is_lie = off(r.angular_gain, angular_gain) || ratio.is_some_and(|e| off(e, RATIO));
-            let is_silent = r.warnings.is_empty();
+            let is_silent = r.warnings.iter().all(|w| ROUTINE.iter().any(|said| w.contains(said)));
             let parameters = |e: &EffectReport| e.parameters.iter().map(|p| p.value).collect::<Vec<_>>();
             let effects: Vec<String> =
                 r.effects.iter().map(|e| format!("{} {:?} {:?}", e.id, e.origin, parameters(e))).collect();
@@ -161,10 +170,15 @@ fn damaged_campaigns_are_not_lied_about() {
     let lies: Vec<&Outcome> = outcomes.iter().filter(|o| o.is_lie).collect();
     let answers = outcomes.iter().filter(|o| o.is_answered).count();
     let silent = lies.iter().filter(|o| o.is_silent).count();
-    println!("{} campaigns, {answers} answered, {} lies, {silent} without a warning", outcomes.len(), lies.len());
+    println!(
+        "{} campaigns, {answers} answered, {} lies, {silent} without a word of the damage",
+        outcomes.len(),
+        lies.len()
+    );
     for o in outcomes.iter().filter(|o| !o.is_answered && o.damage == "nothing") {
         println!("refused though sound: {}", o.what);
     }
+    assert_eq!(silent, 0, "lies without a word of the damage");
     assert!(lies.len() as f64 <= LIES * outcomes.len() as f64, "{} lies", lies.len());
     assert!(answers as f64 > 0.3 * outcomes.len() as f64, "{answers} answers");
 }

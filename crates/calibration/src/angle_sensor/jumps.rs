@@ -1,10 +1,9 @@
 //! Where the angle of a rate gyroscope and its reference part from one row to the next and stay apart: a table that was
 //! zeroed, an encoder that lost counts, an integral that was begun anew. No rate is behind it, and no scale factor either.
 
-use std::f64::consts::TAU;
-
 use super::samples::{integrated, unwrapped};
 use crate::data::slips::slips;
+use crate::data::table::turned;
 use crate::estimation::statistics::median;
 use crate::recording::Run;
 
@@ -21,7 +20,7 @@ pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
     let r = &mut run.recording;
     let Some(theta) = r.theta_deg.as_ref().map(|v| radians(&v[settled.clone()], period)) else { return Vec::new() };
     let reference = match (&r.table_deg, &r.rate_dps) {
-        (Some(table), _) => radians(&table[settled.clone()], TAU),
+        (Some(table), _) => turned(&table[settled.clone()]),
         (None, Some(rate)) => integrated(&r.t_s[settled.clone()], &rate[settled.clone()]),
         (None, None) => return Vec::new(),
     };

@@ -1,9 +1,8 @@
 //! The runs of an angle sensor made ready: what the reference did, what the channels read, and which rows serve for what.
 //! Immutable once built: selection and estimation look at it through lists of rows.
 
-use std::f64::consts::TAU;
-
 use super::rails::without_rails_of_their_own;
+use crate::data::table::turned;
 use crate::data::track::wrapped;
 use crate::error::Refusal;
 use crate::recording::{Campaign, Reference, Role, Run};
@@ -52,7 +51,7 @@ impl SensorRun {
         let r = run.recording;
         let t_s = r.t_s[settled.clone()].to_vec();
         let (reference_rad, measured) = match (&r.table_deg, &r.rate_dps) {
-            (Some(table), _) => (unwrapped(table[settled.clone()].iter().map(|d| d.to_radians()), TAU), true),
+            (Some(table), _) => (turned(&table[settled.clone()]), true),
             (None, Some(rate)) => {
                 let rate = &rate[settled.clone()];
                 (integrated(&t_s, rate), rate.iter().any(|w| *w != rate[0]))
@@ -234,6 +233,7 @@ fn gradient(y: &[f64], t: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn the_gradient_of_a_parabola_over_uneven_steps_is_its_slope() {

@@ -8,4 +8,5 @@ pub(crate) mod plausibility;
 pub(crate) mod rail;
 pub(crate) mod sampling;
 pub(crate) mod slips;
+pub(crate) mod table;
 pub(crate) mod track;

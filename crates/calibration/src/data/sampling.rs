@@ -26,6 +26,12 @@ const ALIKE_SHARE: f64 = 0.2;
 const ALIKE: f64 = 0.05;
 /// Share of the runs that have to agree: one that is broken has no veto.
 const QUORUM: f64 = 0.9;
+/// Fastest that a table turns, rad/s, where nothing tells whole turns from sample to sample: 1000 deg/s.
+const FASTEST_TABLE: f64 = 1000.0 * std::f64::consts::PI / 180.0;
+/// Turns more or less from sample to sample that are tried.
+const MOST_TURNS: f64 = 8.0;
+/// Gains of runs whose table may have turned further agree within this.
+const AGREES: f64 = 5e-3;
 /// A median scatter beyond this share of the period is that of angles that have nothing to do with the input.
 const UNRELATED: f64 = 0.2;
 
@@ -36,6 +42,8 @@ pub(crate) struct Steps {
     pub(crate) name: String,
     pub(crate) input: Vec<f64>,
     pub(crate) angle: Vec<f64>,
+    /// whole turns of the input from sample to sample would not show
+    pub(crate) whole_turns_are_open: bool,
     /// median time between samples, s
     pub(crate) interval_s: f64,
 }
@@ -96,6 +104,8 @@ pub(crate) struct Ambiguity {
     pub(crate) interval_s: f64,
     /// that it has, s
     pub(crate) has_s: f64,
+    /// the step, deg, that the table would make instead, where whole turns are open
+    pub(crate) or_deg: Option<f64>,
 }
 
 impl Steps {
@@ -211,23 +221,113 @@ pub(crate) fn sampling(
         step_deg: run.typical().to_degrees(),
         interval_s: RESOLVED * period / (2.0 * LARGEST_GAIN * speed),
         has_s: run.interval_s,
+        or_deg: None,
     })
+}
+
+/// Another gain than the one that is told, where the table of a run may have turned by whole turns more or less from sample
+/// to sample: one that agrees with all that the runs show. `told` is the gain of each run as it stands.
+pub(crate) fn other_turns(
+    runs: &[Steps],
+    told: impl Fn(usize) -> Option<f64>,
+    (sense, period): (f64, f64),
+    plausible: Plausible,
+) -> Option<Ambiguity> {
+    // what each run tells: as it stands, and with so many turns more a sample
+    let as_it_stands: Vec<f64> = (0..runs.len()).map(|i| told(i).unwrap_or(f64::NAN)).collect();
+    let others: Vec<Vec<(f64, f64)>> =
+        runs.iter().zip(&as_it_stands).map(|(run, k)| run.with_other_turns(sense, period, plausible, *k)).collect();
+    let needed = QUORUM * runs.len() as f64;
+    let agrees = |i: usize, k: f64| {
+        (as_it_stands[i] - k).abs() <= AGREES || others[i].iter().any(|(other, _)| (other - k).abs() <= AGREES)
+    };
+    // Equation 1: a pattern stays behind, unless the campaign says otherwise
+    let may_be = |k: f64| matches!(plausible, Plausible::Stated(_)) || k > 0.0;
+    let is_another =
+        |k: f64| as_it_stands.iter().filter(|told| (*told - k).abs() <= AGREES).count() as f64 <= 0.5 * needed;
+    let borne_out = |k: f64| (0..runs.len()).filter(|i| agrees(*i, k)).count() as f64 >= needed;
+    (0..runs.len()).find_map(|at| {
+        let run = &runs[at];
+        let step = median(&mut run.input.clone());
+        let mut open: Vec<(f64, f64)> = others[at].clone();
+        open.retain(|(k, _)| may_be(*k) && is_another(*k) && borne_out(*k));
+        open.sort_by(|a, b| (step + a.1).abs().total_cmp(&(step + b.1).abs()));
+        let turns = open.first()?.1;
+        Some(Ambiguity {
+            run: run.name.clone(),
+            gains: std::iter::once(as_it_stands[at]).chain(open.iter().map(|(k, _)| *k)).collect(),
+            step_deg: step.to_degrees(),
+            interval_s: 0.5 * std::f64::consts::TAU / FASTEST_TABLE,
+            has_s: run.interval_s,
+            or_deg: Some((step + turns).to_degrees()),
+        })
+    })
+}
+
+impl Steps {
+    /// Gains that explain the angle as well as `k` does, if the input turned by whole turns more or less from sample to
+    /// sample, each with what it turned more, rad.
+    fn with_other_turns(&self, sense: f64, period: f64, plausible: Plausible, k: f64) -> Vec<(f64, f64)> {
+        if !self.whole_turns_are_open {
+            return Vec::new();
+        }
+        let mut buffer = Vec::with_capacity(self.input.len());
+        let limit = AS_PLAUSIBLE * self.scatter(sense, period, k, &mut buffer) + f64::EPSILON * period;
+        let most = (FASTEST_TABLE * self.interval_s / std::f64::consts::TAU).ceil();
+        #[allow(clippy::cast_possible_truncation, reason = "a few turns")]
+        let most = most.min(MOST_TURNS) as i32;
+        let mut out = Vec::new();
+        for n in (-most..=most).filter(|n| *n != 0) {
+            let turns = f64::from(n) * std::f64::consts::TAU;
+            let other = Self { input: self.input.iter().map(|d| d + turns).collect(), ..self.clone() };
+            if other.typical() > FASTEST_TABLE * self.interval_s {
+                continue;
+            }
+            for k in other.gains(sense, period, plausible).unwrap_or_default() {
+                if other.scatter(sense, period, k, &mut buffer) <= limit {
+                    out.push((k, turns));
+                }
+            }
+        }
+        out
+    }
 }
 
 impl Ambiguity {
     /// What is wrong.
     pub(crate) fn problem(&self) -> String {
+        if let Some(or) = self.or_deg {
+            return format!(
+                "table_deg tells by how much the table turns from sample to sample but for whole turns, by {:.1}° or by \
+                 {or:.1}°, so that angular gains of {} explain the angle equally well",
+                self.step_deg,
+                self.few()
+            );
+        }
         let turn = format!("the input turns by {:.1}° from sample to sample", self.step_deg);
         if self.gains.is_empty() {
             return format!("{turn}, and no angular gain that is plausible makes the steps of the angle");
         }
+        format!("{turn}, so that angular gains of {} explain the angle equally well", self.few())
+    }
+
+    /// The first of the gains.
+    fn few(&self) -> String {
         let few: Vec<String> = self.gains.iter().take(6).map(|k| format!("{k:.4}")).collect();
         let more = if self.gains.len() > few.len() { ", …" } else { "" };
-        format!("{turn}, so that angular gains of {}{more} explain the angle equally well", few.join(", "))
+        few.join(", ") + more
     }
 
     /// What would do.
     pub(crate) fn wanted(&self) -> String {
+        if self.or_deg.is_some() {
+            return format!(
+                "rate_dps, or a table_deg that counts turns, or samples at least every {:.2} s, or runs at other rates, or \
+                 angular_gain in the campaign to within {:.0} %",
+                self.interval_s,
+                100.0 * STATED_TO
+            );
+        }
         let slower = (self.interval_s / self.has_s).min(1.0);
         let clock = if self.interval_s < self.has_s && 1e-3 * self.has_s < self.interval_s && self.has_s >= 0.5 {
             "; or t_s in seconds, if these are milliseconds (t_s = \"…*0.001\" in [columns], --map)"
@@ -269,7 +369,7 @@ mod tests {
             ideal + 0.0045 * (2.0 * ideal).sin()
         };
         let angle = times.windows(2).map(|w| theta(w[1]) - theta(w[0])).collect();
-        Steps { name: "run".into(), input, angle, interval_s: times[1] - times[0] }
+        Steps { name: "run".into(), input, angle, interval_s: times[1] - times[0], whole_turns_are_open: false }
     }
 
     fn evenly(hz: f64) -> Vec<f64> {
@@ -314,6 +414,34 @@ mod tests {
             let Sampling::Resolved(k) = told(&runs, Plausible::Resonator) else { panic!() };
             assert!((k - 0.78).abs() < 1e-3, "{k}");
         }
+    }
+
+    /// The same by the angle of its table within a turn.
+    fn within_a_turn(rate_dps: f64, hz: f64) -> Steps {
+        let run = steps(rate_dps, &evenly(hz));
+        let input = run.input.iter().map(|d| wrapped(*d, 2.0 * PI)).collect();
+        Steps { input, whole_turns_are_open: true, ..run }
+    }
+
+    #[test]
+    fn a_table_that_may_turn_further_from_sample_to_sample_leaves_the_gain_open() {
+        let other = |runs: &[Steps], k: &[f64]| other_turns(runs, |i| Some(k[i]), (-1.0, PI), Plausible::Resonator);
+        // 242.5° look like −117.5°, and 0.78 · 242.5° like 0.0783 · 117.5°
+        let fast = within_a_turn(485.0, 2.0);
+        let shown = (180.0 - 0.78 * 242.5) / 117.5;
+        let told = other(std::slice::from_ref(&fast), &[shown]).expect("open");
+        assert!(told.gains.iter().any(|k| (k - 0.78).abs() < 1e-3), "{told:?}");
+        assert!(
+            told.problem().contains("by -117.5° or by 242.5°, so that") && told.wanted().contains("0.18 s"),
+            "{told:?}"
+        );
+        // ten samples a second: no table turns by a turn more
+        assert_eq!(other(&[within_a_turn(485.0, 10.0)], &[0.78]), None);
+        // other rates, of which no other turns agree
+        assert_eq!(
+            other(&[within_a_turn(60.0, 2.0), within_a_turn(-83.0, 2.0), within_a_turn(131.0, 2.0)], &[0.78; 3]),
+            None
+        );
     }
 
     #[test]

@@ -10,9 +10,10 @@ use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope};
 use rayon::prelude::*;
 
 use crate::data::agreement::LARGEST_SPLIT_RAD_S;
+use crate::data::table;
 use crate::error::Refusal;
 use crate::model::prediction::Commands;
-use crate::recording::{Recording, Role, Run};
+use crate::recording::{Role, Run};
 
 /// A rotation run, ready for a fit.
 #[derive(Debug)]
@@ -25,6 +26,8 @@ pub(crate) struct Track {
     pub(crate) t_s: Vec<f64>,
     /// input angle, rad, 0 where the table's own angle starts
     pub(crate) input_rad: Vec<f64>,
+    /// only the table's angle within a turn was recorded: whole turns from sample to sample would not show
+    pub(crate) whole_turns_are_open: bool,
     /// stretches without a gap, and what each is for
     pub(crate) segments: Vec<Segment>,
     /// every how many samples a first look takes: more than one only in runs of more than [`ENOUGH_SAMPLES`], until they are
@@ -143,6 +146,7 @@ impl Track {
             file: self.file.clone(),
             t_s: of(&self.t_s),
             input_rad: of(&self.input_rad),
+            whole_turns_are_open: self.whole_turns_are_open,
             segments,
             stride: 1,
             dense: None,
@@ -181,7 +185,7 @@ impl Track {
         let role = run.role;
         let amplitude = run.amplitude;
         let mut recording = run.recording;
-        let input_rad = input_angle(&mut recording);
+        let (input_rad, whole_turns_are_open) = table::input_angle(&mut recording);
         let source = match (recording.xc_v.take(), recording.yc_v.take(), recording.theta_deg.take()) {
             (Some(x), Some(y), _) => Source::Channels {
                 in_phase: [x, y],
@@ -202,6 +206,7 @@ impl Track {
             file,
             t_s,
             input_rad,
+            whole_turns_are_open,
             segments,
             stride: 1,
             dense: None,
@@ -400,43 +405,6 @@ fn spread(values: &[f64]) -> f64 {
     hi - lo
 }
 
-/// The input angle in rad: the table's own, unwrapped, or the rate integrated.
-fn input_angle(recording: &mut Recording) -> Vec<f64> {
-    let table = recording.table_deg.take();
-    let rate = recording.rate_dps.take();
-    let t = &recording.t_s;
-    if let Some(table) = table {
-        return along_rate(&table, rate.as_deref(), t);
-    }
-    let Some(rate) = rate else { return vec![0.0; t.len()] };
-    let mut angle = 0.0;
-    let mut out = Vec::with_capacity(t.len());
-    for i in 0..rate.len().min(t.len()) {
-        if i > 0 {
-            angle += 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]);
-        }
-        out.push(angle);
-    }
-    out
-}
-
-/// The table's angle in degrees as a continuous one in rad: each step is the nearest to what the rate says, or the shortest
-/// where there is none.
-fn along_rate(table: &[f64], rate: Option<&[f64]>, t: &[f64]) -> Vec<f64> {
-    let mut out: Vec<f64> = Vec::with_capacity(table.len());
-    for (i, d) in table.iter().enumerate() {
-        let raw = d.to_radians();
-        let last = out.last().copied().unwrap_or(raw);
-        let by_rate = match rate {
-            Some(rate) if i > 0 => 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]),
-            _ => 0.0,
-        };
-        let step = by_rate + wrapped(raw - last - by_rate, std::f64::consts::TAU);
-        out.push(last + step);
-    }
-    out
-}
-
 /// An angle in degrees of any wrapping as a continuous one in rad: each step is the shortest of the period.
 fn unwrapped(degrees: &[f64], period_rad: f64) -> Vec<f64> {
     let mut out: Vec<f64> = Vec::with_capacity(degrees.len());
@@ -528,6 +496,7 @@ pub(crate) fn run_name(run: &Run) -> String {
 #[allow(clippy::expect_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+    use crate::recording::Recording;
 
     const TURN_PER_SAMPLE: f64 = 0.01;
 

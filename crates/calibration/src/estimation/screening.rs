@@ -4,7 +4,7 @@
 
 use crate::data::agreement::{Gain, RunGain, Verdict, verdict};
 use crate::data::plausibility::mend;
-use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, sampling, spread_over};
+use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, other_turns, sampling, spread_over};
 use crate::data::slips::slips;
 use crate::data::track::{Track, run_name, wrapped};
 use crate::error::Refusal;
@@ -20,8 +20,12 @@ const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 const MOST_BROKEN: f64 = 0.5;
 /// Runs to fit that have to be left where nothing can be made of one: of two, which is as it was meant is not known.
 const FEWEST_LEFT: usize = 2;
-/// A run with more slips than this has no clock.
+/// A run with more slips than this has no clock,
 const MOST_SLIPS: usize = 8;
+/// and neither has one with several that together go this share of its way: they are no slips of a clock beside which a
+/// gain is told, but a bit that hangs, or rows of something else.
+const SEVERAL_SLIPS: usize = 3;
+const SHARE_OF_THE_WAY: f64 = 0.1;
 /// Amplitudes in one unit, each over its relative set amplitude, are within this factor: a thousand is the next unit.
 const SAME_AMPLITUDE: f64 = 30.0;
 /// Samples of a run that tell its amplitude.
@@ -282,10 +286,15 @@ impl Screen {
         };
         let steps: Vec<Steps> = tracks.iter().map(|t| steps(t, start)).collect();
         let followed = |i: usize| first.get(i).map(|m| m.angular_gain);
-        match sampling(&steps, followed, (start.sense(), start.period_rad), plausible) {
-            Sampling::Close => Ok(Guess::Open(self.stated)),
-            Sampling::Resolved(k) => Ok(Guess::Settled(k)),
-            Sampling::Ambiguous(a) => Err(Refusal::no_answer(&a.run, a.problem(), a.wanted())),
+        let modulo = (start.sense(), start.period_rad);
+        let (guess, settled) = match sampling(&steps, followed, modulo, plausible) {
+            Sampling::Close => (Guess::Open(self.stated), None),
+            Sampling::Resolved(k) => (Guess::Settled(k), Some(k)),
+            Sampling::Ambiguous(a) => return Err(Refusal::no_answer(&a.run, a.problem(), a.wanted())),
+        };
+        match other_turns(&steps, |i| settled.or_else(|| followed(i)), modulo, plausible) {
+            Some(a) => Err(Refusal::no_answer(&a.run, a.problem(), a.wanted())),
+            None => Ok(guess),
         }
     }
 
@@ -309,7 +318,8 @@ impl Screen {
 /// Steps between neighbouring samples of a track, evenly from all of it.
 fn steps(track: &Track, hypothesis: &Hypothesis) -> Steps {
     let bearing = |i: usize| bearing(track, hypothesis, i);
-    let mut out = Steps { name: track.name.clone(), ..Steps::default() };
+    let mut out =
+        Steps { name: track.name.clone(), whole_turns_are_open: track.whole_turns_are_open, ..Steps::default() };
     let mut intervals = Vec::new();
     let count: usize = track.segments.iter().map(|s| s.range.len()).sum();
     let every = spread_over(count).nth(1).unwrap_or(1);
@@ -358,7 +368,8 @@ fn cut_at_slips(
     }
     let Some(&(first, by)) = found.first() else { return Ok(false) };
     let place = |row: usize| format!("row {} ({:.3} s)", row + 1, track.t_s[row]);
-    if found.len() > MOST_SLIPS {
+    let together: f64 = found.iter().map(|(_, by)| by.abs()).sum();
+    if found.len() > MOST_SLIPS || (found.len() >= SEVERAL_SLIPS && together > SHARE_OF_THE_WAY * motion.travel) {
         return Err(format!(
             "its angle jumps against the input {} times, first by {:.2}° at {}: the clock slips, or samples are lost",
             found.len(),

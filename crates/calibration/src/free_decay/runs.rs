@@ -7,6 +7,7 @@ use cvg_model::Envelope;
 
 use super::stokes::{self, State};
 use crate::carrier::phased;
+use crate::data::table::turned;
 use crate::error::Refusal;
 use crate::estimation::statistics::{line, median, white_noise};
 use crate::recording::{Role, Run};
@@ -150,12 +151,8 @@ fn rates(run: &Run, rows: Range<usize>) -> (Vec<f64>, bool) {
     let r = &run.recording;
     let constant = |dps: f64, known: bool| (vec![dps.to_radians(); rows.len()], known);
     if let Some(table) = &r.table_deg {
-        let mut unwrapped = table[rows.clone()].to_vec();
-        for i in 1..unwrapped.len() {
-            let step = unwrapped[i] - unwrapped[i - 1];
-            unwrapped[i] -= 360.0 * (step / 360.0).round();
-        }
-        return constant(line(&r.t_s[rows.clone()], &unwrapped).0, true);
+        let turned: Vec<f64> = turned(&table[rows.clone()]).iter().map(|a| a.to_degrees()).collect();
+        return constant(line(&r.t_s[rows.clone()], &turned).0, true);
     }
     if let Some(rate) = &r.rate_dps {
         let of = &rate[rows.clone()];
