@@ -185,6 +185,42 @@ fn milliseconds_for_seconds_are_suggested() {
     is_refused(identified(vec![recording]), &["milliseconds"]);
 }
 
+/// 242.5° from row to row are −117.5° of a table's angle within a turn.
+#[test]
+fn a_table_that_may_turn_further_from_row_to_row_is_no_answer() {
+    let slow = Made {
+        rate_dps: 485.0,
+        sample_hz: 2.0,
+        duration_s: 400.0,
+        angular_gain: 0.55,
+        reference: Told::Table,
+        ..Made::default()
+    };
+    is_refused(
+        identified(vec![slow.recording()]),
+        &[
+            "but for whole turns, by -117.5° or by 242.5°",
+            "0.5500",
+            "rate_dps, or a table_deg that counts turns",
+            "0.18 s",
+        ],
+    );
+}
+
+/// What tells its turns: a column that counts them, a stated gain, or another rate.
+#[test]
+fn a_table_whose_turns_are_told_from_row_to_row_is_answered() {
+    let made = Made { rate_dps: 185.0, sample_hz: 2.0, duration_s: 400.0, reference: Told::Table, ..Made::default() };
+    let mut counts = Made { rate_dps: 400.0, ..made.clone() }.recording();
+    counts.table_deg = Some(counts.t_s.iter().map(|t| 400.0 * t).collect());
+    let mut stated = campaign(vec![counts]);
+    stated.angular_gain = Some(0.8);
+    is_right(identify(stated, &Options::default()), &[]);
+    let rates = [185.0, -130.0, 71.0].into_iter().enumerate();
+    let runs = rates.map(|(i, rate_dps)| Made { rate_dps, seed: i as u64 + 1, ..made.clone() }.recording());
+    is_right(identified(runs.collect()), &[]);
+}
+
 // Numbers
 
 /// Clean samples outweigh what is believed of a drift by more than a double resolves.
@@ -236,6 +272,18 @@ fn rows_that_stand_still_are_named_and_left_out() {
     }
 }
 
+/// A channel that died after the first of a hundred thousand rows is not read slowly.
+#[test]
+fn a_channel_that_stands_still_to_the_end_is_said_to() {
+    for (rows, stands) in [(5_000, 3_999), (100_000, 98_999)] {
+        let mut recording = Made { rate_dps: 90.0, duration_s: f64::from(rows) / 100.0, ..Made::default() }.recording();
+        let x = recording.xc_v.as_mut().unwrap();
+        let value = x[1000];
+        x[1000..].fill(value);
+        is_refused(identified(vec![recording]), &[&format!("{stands} of {rows} rows repeat the one before")]);
+    }
+}
+
 #[test]
 fn a_recording_that_is_written_faster_than_it_is_read_is_answered() {
     let mut recording = Made { rate_dps: 60.0, duration_s: 40.0, ..Made::default() }.recording();
@@ -248,6 +296,26 @@ fn a_clock_that_slips_is_named_and_does_not_bend_the_answer() {
     let mut recording = Made::default().recording();
     recording.t_s[1001..].iter_mut().for_each(|t| *t += 0.05);
     is_right(identified(vec![recording]), &["row 1002", "the clock slips", "500dps-1.csv"]);
+}
+
+/// Five jumps of 44° on a way of 1150° are a converter's bit that hangs, or rows of something else.
+#[test]
+fn jumps_that_go_a_tenth_of_the_way_are_no_slips_of_a_clock() {
+    let jumped = |count: usize| {
+        let mut recording = Made { rate_dps: -86.0, duration_s: 17.2, ..Made::default() }.recording();
+        let rows = recording.len();
+        let (Some(x), Some(y)) = (&mut recording.xc_v, &mut recording.yc_v) else { unreachable!() };
+        for at in (1..=count).map(|n| n * rows / (count + 1)) {
+            let (sin, cos) = 44.0f64.to_radians().sin_cos();
+            for (x, y) in x[at..].iter_mut().zip(&mut y[at..]) {
+                let [a, b] = [*x, *y / RATIO];
+                (*x, *y) = (a * cos - b * sin, RATIO * (a * sin + b * cos));
+            }
+        }
+        identified(vec![recording])
+    };
+    is_right(jumped(1), &["the clock slips there"]);
+    is_refused(jumped(5), &["jumps against the input 5 times"]);
 }
 
 #[test]

@@ -21,6 +21,8 @@ pub(super) const HELD_ALONE: usize = 5;
 pub(crate) const MOST_LOST: f64 = 0.3;
 /// A recording is held throughout where this share of its values is of one age.
 const THROUGHOUT: f64 = 0.8;
+/// … of at least so many ages: one value that stands to the end was not read at all.
+const FEWEST_AGES: usize = 16;
 /// A value that is clipped stands still for more than this many times as long as a step of its converter makes it.
 const CLIPPED: f64 = 2.0;
 /// A table and a rate agree within this share.
@@ -87,8 +89,9 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let places = places(&recording.t_s, &held);
     let usual = median(&mut held.iter().map(|r| r.len() as f64).collect::<Vec<_>>());
     let alike = held.iter().filter(|r| (r.len() as f64 - usual).abs() < 0.5).map(Range::len).sum::<usize>();
-    let throughout =
-        alike as f64 > THROUGHOUT * lost as f64 && held.len() as f64 * (usual + 1.0) > THROUGHOUT * rows as f64;
+    let throughout = held.len() >= FEWEST_AGES
+        && alike as f64 > THROUGHOUT * lost as f64
+        && held.len() as f64 * (usual + 1.0) > THROUGHOUT * rows as f64;
     if throughout {
         findings.warnings.push(format!(
             "{name}: every value is held for {:.0} rows: the instrument was read more slowly than it was written; {lost} \
