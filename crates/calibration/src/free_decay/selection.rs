@@ -67,7 +67,7 @@ pub(crate) fn instead(added: &[Added], fitted: &Fit, data: Data<'_>) -> Vec<Inst
             }
             let other = fit(&model, &fitted.starts, data);
             let as_well = other.minus_two_log - fitted.minus_two_log < RULED_OUT;
-            (is_sound(&other) && as_well).then(|| Instead { of, by: rival.term, model: other.model })
+            (is_sound(&other) && as_well).then_some(Instead { of, by: rival.term, model: other.model })
         })
         .collect()
 }
