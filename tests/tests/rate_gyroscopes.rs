@@ -196,3 +196,72 @@ fn a_jump_in_a_run_of_a_rate_gyroscope_is_named_and_left_out() {
         assert!(report.warnings.iter().any(is_said), "{said}: {:?}", report.warnings);
     }
 }
+
+/// A rate gyroscope with a bias of −0.2 deg/s at 200 Hz, integrated as recorded rates are, by trapezoids, on a table that
+/// steps from rate to rate with a ripple of `ripple`: its reversals fall between two rows, and the table's angle has turned a
+/// whole row at the rate before.
+fn stepped(rates_dps: &[f64], ripple: f64, seed: u64) -> Run {
+    let mut noise = Noise::new(seed);
+    let (dt, rows) = (0.005, 2000 * rates_dps.len());
+    let (mut t_s, mut table, mut theta) = (vec![], vec![], vec![]);
+    let (mut angle, mut sum, mut before) = (0.0f64, 0.0, None);
+    for i in 0..rows {
+        let rate = rates_dps[i / 2000] * (1.0 + ripple * (7.0 * angle).to_radians().sin());
+        let read = rate - 0.2 + 0.02 * noise.sample();
+        sum += before.map_or(0.0, |last: f64| 0.5 * (last + read) * dt);
+        before = Some(read);
+        t_s.push(dt * i as f64);
+        table.push(angle);
+        theta.push(sum);
+        angle += rate * dt;
+    }
+    run(
+        "steps.csv",
+        Role::Fit,
+        Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() },
+    )
+}
+
+/// Half a row between the rules of two sums is a lag where the table turns back often, and nothing is told of it where it
+/// turns back once; the bias and its interval hold in either case.
+#[test]
+fn a_table_that_steps_from_rate_to_rate_leaves_the_bias_where_it_is() {
+    let within = |value: f64, e: &[f64; 2]| e[0] <= value && value <= e[1];
+    for (rates, tells_lag) in
+        [(&[60.0, -60.0][..], false), (&[60.0, -60.0, 60.0], true), (&[30.0, -30.0, 90.0, -90.0], true)]
+    {
+        for (ripple, seed) in [(0.0, 1), (0.0, 2), (0.002, 3)] {
+            let said = format!("{rates:?}, ripple {ripple}, seed {seed}");
+            let i = turned(vec![stepped(rates, ripple, seed)]).unwrap();
+            assert_eq!(i.report.status, Status::Answered, "{said}: {:?}", i.report.reason);
+            let bias = &find(&i, "rate-offset").unwrap_or_else(|| panic!("{said}: {:#?}", i.report)).parameters[0];
+            assert!(within(-0.2f64.to_radians(), &bias.ci95.unwrap()), "{said}: {bias:?}");
+            let alone = i.report.runs[0].bias_dps.unwrap();
+            assert!(within(-0.2, &alone.ci95) && alone.half_width() < 0.02, "{said}: {alone:?}");
+            let lag = find(&i, "angle-latency");
+            assert_eq!(lag.is_some(), tells_lag, "{said}: {lag:?}");
+            if let Some(lag) = lag {
+                let [low, high] = lag.parameters[0].ci95.unwrap();
+                // the angle walks by a few thousandths of a degree between the reversals, which part it by tenths
+                assert!((lag.parameters[0].value + 0.0025).abs() < 1e-4 && high - low < 1e-3, "{said}: {lag:?}");
+            }
+            let one_place = i.report.warnings.iter().any(|w| w.contains("one place does not tell a lag from a slip"));
+            assert_eq!(one_place, !tells_lag, "{said}: {:?}", i.report.warnings);
+            assert!(!i.report.warnings.iter().any(|w| w.contains("jumps by")), "{said}: {:?}", i.report.warnings);
+        }
+    }
+}
+
+/// What a run tells by itself is its own: neither the other runs' scale factor, nor what the best line takes out of its error.
+#[test]
+fn each_run_of_a_rate_gyroscope_tells_its_own_bias_and_scale_factor() {
+    let rates = [90.0, -90.0, 60.0, -60.0];
+    let biases = [0.1, 0.3, -0.2];
+    let runs = biases.iter().enumerate().map(|(i, b)| turned_at(&format!("{i}.csv"), &rates, *b, i as u64));
+    let i = turned(runs.collect()).unwrap();
+    for (run, set) in i.report.runs.iter().zip(biases) {
+        let (bias, gain) = (run.bias_dps.unwrap(), run.angular_gain.unwrap());
+        assert!(bias.ci95[0] < set && set < bias.ci95[1] && bias.half_width() < 0.02, "{bias:?} for {set}");
+        assert!(gain.ci95[0] < -0.98 && -0.98 < gain.ci95[1] && gain.half_width() < 1e-3, "{gain:?}");
+    }
+}

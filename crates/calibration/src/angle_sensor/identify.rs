@@ -5,9 +5,9 @@ use super::deviations::{deviations, own_gain_ratios};
 use super::effects::Described;
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
-use super::rate_gyroscope::{RateGyroscope, Term};
+use super::rate_gyroscope::{RateGyroscope, T_PARTS, Term};
 use super::rate_runs;
-use super::report::{Errors, Finding, Head, report};
+use super::report::{Alone, Errors, Finding, Head, report};
 use super::samples::{Reading, SensorRun, apart, prepare, span};
 use super::screening::believed;
 use super::sensor::other_unit;
@@ -237,6 +237,7 @@ fn sensor_finding(
             let model = model.clone();
             move |run| model.left(run)
         }),
+        alone: None,
         readout: model.front().cloned(),
         direction: Box::new(move |run| {
             model.sensor.samples(std::slice::from_ref(run), model.front()).iter().map(|s| s.theta).collect()
@@ -339,6 +340,13 @@ fn rate_finding(
                 .into(),
         );
     }
+    if let Some(lag) = model.lag_of_one_place {
+        warnings.push(format!(
+            "the angle and its reference part at one place only, where the rate changes, as a lag of {:.3} ms makes them: one place \
+             does not tell a lag from a slip, and it is left as it is; runs that turn back several times tell",
+            1e3 * lag
+        ));
+    }
     if model.bias_varies {
         warnings
             .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
@@ -361,6 +369,10 @@ fn rate_finding(
         warnings,
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
+        alone: model.answered.then(|| -> Alone<'_> {
+            let model = model.clone();
+            Box::new(move |run| model.alone(run))
+        }),
         discovered: Box::new(move |run| model.left(run)),
         readout: None,
         direction: Box::new(move |run| {
@@ -369,9 +381,6 @@ fn rate_finding(
         period,
     })
 }
-
-/// Student's 97.5 % point for one fewer than five parts.
-const T_PARTS: f64 = 2.776;
 
 fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
     if !model.answered {

@@ -1,7 +1,10 @@
 //! Where the angle of a rate gyroscope and its reference part from one row to the next and stay apart: a table that was
 //! zeroed, an encoder that lost counts, an integral that was begun anew. No rate is behind it, and no scale factor either.
+//!
+//! A table that turns back from one row to the next parts from an angle that is late by a part of a row as well, or from one
+//! that was summed by another rule. That goes with the change of the rate, row by row, and is a lag's.
 
-use super::samples::{integrated, unwrapped};
+use super::samples::{integrated, span, unwrapped};
 use crate::data::slips::slips;
 use crate::data::table::turned;
 use crate::estimation::statistics::median;
@@ -11,6 +14,8 @@ use crate::recording::Run;
 const PARTS: usize = 50;
 /// Jumps into rows so close to each other are one.
 const TOGETHER: usize = 2;
+/// What being late makes of a row is no more than the change of the step there, and the noise of a row.
+const LATE: f64 = 1.05;
 /// Rows on either side of a jump that tell how far a step usually goes.
 const BESIDE: usize = 12;
 
@@ -28,6 +33,9 @@ pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
     let expected: Vec<f64> = reference.iter().map(|a| gain * a).collect();
     let mut jumps: Vec<Jump> = Vec::new();
     for slip in slips(&theta, &expected, period) {
+        if slip.by.abs() <= LATE * change_of_step(&expected, slip.at) {
+            continue;
+        }
         let row = settled.start + slip.at;
         let is_table = r.table_deg.is_some() && unusual(&expected, slip.at) > unusual(&theta, slip.at);
         let (column, name, by) = match (&mut r.table_deg, &mut r.theta_deg) {
@@ -76,6 +84,12 @@ fn gain(theta: &[f64], reference: &[f64]) -> Option<f64> {
     let mut ratios: Vec<f64> =
         theta.iter().zip(&reference).filter(|(_, d)| d.abs() >= usual && **d != 0.0).map(|(t, d)| t / d).collect();
     (!ratios.is_empty()).then(|| median(&mut ratios)).filter(|g| g.is_finite() && *g != 0.0)
+}
+
+/// By how much the steps about row `at` differ from each other, apart from the one into it.
+fn change_of_step(angle: &[f64], at: usize) -> f64 {
+    let beside = at.saturating_sub(BESIDE).max(1)..(at + BESIDE).min(angle.len());
+    span(&beside.filter(|i| *i != at).map(|i| angle[i] - angle[i - 1]).collect::<Vec<_>>())
 }
 
 /// By how much the step into row `at` differs from those beside it.

@@ -13,6 +13,7 @@ pub(crate) mod likeness;
 mod lines;
 pub(crate) mod model;
 mod rails;
+mod rate_alone;
 pub(crate) mod rate_gyroscope;
 mod rate_runs;
 mod readout;

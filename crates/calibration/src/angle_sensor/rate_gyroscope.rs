@@ -7,7 +7,9 @@
 //! best by all of its rows. Increments, which would make a random walk white, tell bias and scale factor worse here, and so
 //! does a choice among subsets of the terms by five parts that were left out: it is decided by the one part in which the
 //! others move most. The bias and the scale factor are therefore always estimated where they can be told apart. The lag is a
-//! matter of single turns, and blocks left out in turn say whether it helps.
+//! matter of single turns, and blocks left out in turn say whether it helps. Where all of it shows at one place, as in a run
+//! that turns back once, nothing tells it from a slip there: the jump is then kept out of the bias and is no lag of the
+//! instrument.
 
 use super::cross_validation::Folds;
 use super::samples::{Reading, SensorRun};
@@ -34,8 +36,12 @@ const LEAST_FALL: f64 = 0.01;
 const TOLD_FROM_A_LINE: f64 = 1e-4;
 /// Parts of a run, each left out once.
 const PARTS: usize = 5;
+/// Student's 97.5 % point for one fewer than five parts.
+pub(super) const T_PARTS: f64 = 2.776;
 /// Standard errors by which left-out parts have to be predicted worse than by nothing for a fit to be refused.
 const HARMS: f64 = 2.0;
+/// A lag is told where every part that is left out leaves this share of what tells it.
+const LEFT_BY_A_PART: f64 = 0.01;
 /// Rows that a part needs to be fitted with.
 const FEWEST_ROWS: usize = 10;
 
@@ -50,7 +56,7 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
+    pub(super) fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
         let Reading::Angle(theta) = &run.reading else { return None };
         let raw: Vec<f64> = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - sensor.gain * a).collect();
         let error = centred(&raw, sensor.period);
@@ -85,6 +91,11 @@ impl Stretch {
     /// Whether its rate varies by enough of the fastest one to tell what goes with the rate from what goes with the time.
     fn varies(&self, fastest: f64) -> bool {
         variance(&self.rate).sqrt() > VARYING_RATE * fastest
+    }
+
+    /// The same with `values` of `terms` taken out of its error.
+    pub(super) fn without(&self, terms: &[Term], values: &[f64]) -> Self {
+        Self { error: self.left(terms, values), ..self.clone() }
     }
 
     /// What `values` of `terms` leave of the error.
@@ -125,8 +136,39 @@ fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -> Vec<f64> 
     equations.solve()
 }
 
-fn estimate(stretches: &[Stretch], terms: &[Term]) -> Vec<f64> {
+pub(super) fn estimate(stretches: &[Stretch], terms: &[Term]) -> Vec<f64> {
     solved(rows(stretches, terms).iter(), terms.len())
+}
+
+/// How much of a term stands beside the others, as a sum of squares of its regressor.
+fn beside_the_others(stretches: &[Stretch], terms: &[Term], at: usize) -> f64 {
+    let apart = |(mut row, _): Row| {
+        let own = row.remove(at);
+        (row, own)
+    };
+    let rows: Vec<Row> = rows(stretches, terms).into_iter().map(apart).collect();
+    let by_others = solved(rows.iter(), terms.len() - 1);
+    rows.iter().map(|(row, own)| (own - row.iter().zip(&by_others).map(|(a, b)| a * b).sum::<f64>()).powi(2)).sum()
+}
+
+/// Estimates from every split, with a lag of zero where what is left of the runs does not tell one; and whether each tells it.
+pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term]) -> (Vec<Vec<f64>>, bool) {
+    let Some(at) = terms.iter().position(|t| *t == Term::Lag) else {
+        return (splits.iter().map(|s| estimate(&s.train, terms)).collect(), true);
+    };
+    let least = LEFT_BY_A_PART * beside_the_others(all, terms, at);
+    let others: Vec<Term> = terms.iter().copied().filter(|t| *t != Term::Lag).collect();
+    let mut told = true;
+    let fits = splits.iter().map(|s| {
+        if beside_the_others(&s.train, terms, at) > least {
+            return estimate(&s.train, terms);
+        }
+        told = false;
+        let mut values = estimate(&s.train, &others);
+        values.insert(at, 0.0);
+        values
+    });
+    (fits.collect(), told)
 }
 
 /// Sum of squares of interleaved blocks that were left out in turn, rad².
@@ -140,13 +182,18 @@ fn left_out_in_turn(stretches: &[Stretch], folds: &Folds, terms: &[Term]) -> f64
     (0..folds.count).map(square_of).sum()
 }
 
-/// The terms that these stretches tell, of which `folds` leaves out blocks.
-fn told(stretches: &[Stretch], folds: &Folds) -> Vec<Term> {
+/// A scale factor is told from a bias.
+pub(super) fn tell_scale(stretches: &[Stretch]) -> bool {
     let line = rows(stretches, &[Term::Bias, Term::Scale]);
     let moment = |i: usize, j: usize| line.iter().map(|(r, _)| r[i] * r[j]).sum::<f64>();
     let beside_a_line = moment(1, 1) - moment(0, 1).powi(2) / moment(0, 0).max(f64::MIN_POSITIVE);
+    beside_a_line > TOLD_FROM_A_LINE * moment(1, 1)
+}
+
+/// The terms that these stretches tell, of which `folds` leaves out blocks.
+fn told(stretches: &[Stretch], folds: &Folds) -> Vec<Term> {
     let mut terms = vec![Term::Bias];
-    if beside_a_line > TOLD_FROM_A_LINE * moment(1, 1) {
+    if tell_scale(stretches) {
         terms.push(Term::Scale);
     }
     let with_lag = [terms.as_slice(), &[Term::Lag]].concat();
@@ -162,6 +209,8 @@ pub(crate) struct RateGyroscope {
     pub(crate) answered: bool,
     /// terms with their values and standard deviations by the jackknife over parts
     pub(crate) terms: Vec<(Term, f64, f64)>,
+    /// what would be a lag, s, where all of it shows in one part of the runs
+    pub(crate) lag_of_one_place: Option<f64>,
     /// the bias does not repeat from run to run: it is taken to be zero elsewhere
     pub(crate) bias_varies: bool,
     /// geometric mean of the left-out rms, rad, with the terms and without
@@ -172,12 +221,12 @@ pub(crate) struct RateGyroscope {
 }
 
 /// A left-out part and what is fitted without it.
-struct Split {
+pub(super) struct Split {
     train: Vec<Stretch>,
     test: Stretch,
 }
 
-fn splits(all: &[Stretch]) -> Vec<Split> {
+pub(super) fn splits(all: &[Stretch]) -> Vec<Split> {
     let mut out = Vec::new();
     for (number, run) in all.iter().enumerate() {
         let n = run.error.len();
@@ -203,7 +252,7 @@ impl RateGyroscope {
             return None;
         }
         let terms = told(&all, &Folds::interleaved(runs));
-        let fits: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &terms)).collect();
+        let (fits, tells_lag) = estimates(&all, &splits, &terms);
         let log_variance = |left: Vec<f64>| variance(&left).ln();
         let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(s.test.left(&terms, v))).collect();
         let raw: Vec<f64> = splits.iter().map(|s| log_variance(s.test.error.clone())).collect();
@@ -216,13 +265,16 @@ impl RateGyroscope {
         let bias_varies = forget_a_bias_that_varies(&all, &terms, &mut values);
         let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
-        let every_fit: Vec<Vec<f64>> = splits.iter().map(|s| estimate(&s.train, &every)).collect();
+        let (every_fit, _) = estimates(&all, &splits, &every);
         let tells_scale = terms.iter().position(|t| *t == Term::Scale);
         let scale = tells_scale.filter(|_| answered).map_or(0.0, |i| values[i]);
+        let found = terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v, d));
+        let (lags, terms): (Vec<_>, Vec<_>) = found.partition(|t| t.0 == Term::Lag && !tells_lag);
         Some(Self {
             sensor,
             answered,
-            terms: terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v, d)).collect(),
+            terms,
+            lag_of_one_place: lags.first().map(|t| -t.1 / (sensor.gain + scale)),
             bias_varies,
             predicted: (0.5 * mean(&loss)).exp(),
             predicted_raw: (0.5 * mean(&raw)).exp(),
@@ -275,7 +327,7 @@ fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], values: &mut [f64]
 }
 
 /// Standard deviations of estimates each made without one part (Künsch 1989).
-fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
+pub(super) fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
     let n = fits.len() as f64;
     (0..unknowns)
         .map(|i| {

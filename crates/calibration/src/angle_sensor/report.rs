@@ -2,12 +2,13 @@
 //! found, in the form that all instruments share.
 
 use super::curve::Curve;
+use super::rate_alone::Alone as RunAlone;
 use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
-use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics};
+use crate::diagnostics::residual::{Follows, reported_harmonics};
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::residuals::Residual;
@@ -18,7 +19,6 @@ use crate::recording::{Campaign, Instrument};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
-use crate::report::runs::Slope;
 use crate::report::stages::stages;
 use crate::report::unexplained::residual_report;
 use crate::report::{
@@ -28,6 +28,9 @@ use crate::report::{
 
 /// Errors of a run at one stage, rad.
 pub(crate) type Errors<'a> = Box<dyn Fn(&SensorRun) -> Vec<f64> + 'a>;
+
+/// What a run of a rate gyroscope tells by itself.
+pub(crate) type Alone<'a> = Box<dyn Fn(&SensorRun) -> Option<RunAlone> + 'a>;
 
 /// What an identification found, with the errors that it leaves of any run.
 pub(crate) struct Finding<'a> {
@@ -48,6 +51,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) raw: Option<Errors<'a>>,
     pub(crate) declared: Errors<'a>,
     pub(crate) discovered: Errors<'a>,
+    /// what each run tells by itself, of a rate gyroscope that is answered
+    pub(crate) alone: Option<Alone<'a>>,
     /// the angle that the error is shown against
     pub(crate) direction: Errors<'a>,
     /// what is undone in the channels, where there are two
@@ -89,6 +94,9 @@ impl Head {
     }
 }
 
+/// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
+/// a bias and a scale factor along, whatever they are, and are no test of either.
+const SAME_ERROR: f64 = 1e-3;
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
 /// Reference steps below which differences of neighbours are noise, rad; and how near stations count as one, rad.
@@ -118,7 +126,8 @@ impl Evaluated {
         let mut declared = evaluate(&finding.declared, held, Some(&discovered));
         let reason = finding.reason.clone().or_else(|| {
             let [left, nothing] = [discovered.size(), raw.as_ref()?.size()].map(|size| size.rms_deg);
-            (left > nothing).then(|| {
+            let alike = if finding.instrument == Instrument::Gyroscope { SAME_ERROR } else { 0.0 };
+            (left > (1.0 + alike) * nothing).then(|| {
                 format!(
                     "what was found does not help on held-out data: it leaves {left:.4}°, and nothing undone leaves \
                      {nothing:.4}°"
@@ -352,7 +361,6 @@ fn runs(
 ) -> (Vec<RunReport>, Option<Temperature>) {
     let mut out = head.runs.clone();
     let mut steady = vec![None; out.len()];
-    let memory = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
     let both = fitted.iter().zip(&on_fit.segments).zip(&on_fit.kept).map(|x| (x, true));
     for (((run, s), kept), is_fit) in both.chain(held.iter().zip(&after.segments).zip(&after.kept).map(|x| (x, false)))
     {
@@ -365,7 +373,7 @@ fn runs(
         r.rms_deg = Some(own.size().rms_deg);
         let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
         if is_fit || !shared {
-            tell(r, run, finding, (s, kept), memory);
+            tell(r, run, finding, kept);
             let speed = run.rate_rad_s.iter().map(|w| w.abs()).sum::<f64>() / run.len() as f64;
             steady[run.number] = Some(rate).filter(|r| r.abs() > ONE_WAY * speed.to_degrees());
         }
@@ -386,24 +394,17 @@ fn runs(
 }
 
 /// Gain and bias of a rate gyroscope as one run alone tells them; the gain ratio of channels beside a temperature.
-fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, (s, kept): (&Residual, &[bool]), memory: f64) {
+fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]) {
     if r.temp_c.is_some() && run.channels().is_some() {
         r.detection_gain_ratio = super::ellipse::gain_ratio(run);
     }
-    if finding.instrument != Instrument::Gyroscope || finding.reason.is_some() {
-        return;
-    }
-    let (mut of_input, mut of_time) = (Slope::default(), Slope::default());
-    of_input.add(&s.turned, &s.angle, kept);
-    of_time.add(&s.t_s, &s.angle, kept);
-    if let (Some([slope, deviation, _]), Some([drift, drift_deviation, _])) =
-        (of_input.told(memory), of_time.told(memory))
-    {
-        let gain = finding.hypothesis.angular_gain + finding.hypothesis.sense() * slope;
-        r.angular_gain = Some(Estimate::new(gain, deviation));
-        let bias = finding.hypothesis.rate_bias_rad_s + drift;
-        r.bias_dps = Some(Estimate::new(bias.to_degrees(), drift_deviation.to_degrees()));
-    }
+    let rows: Vec<usize> = (0..run.len()).filter(|&i| kept[i]).collect();
+    let Some(alone) = finding.alone.as_ref().and_then(|alone| alone(&run.subset(&rows))) else { return };
+    let Estimate { value, ci95: [low, high] } = alone.gain;
+    // the sign by which the campaign counts
+    let counts_alike = value * finding.hypothesis.angular_gain >= 0.0;
+    r.angular_gain = Some(if counts_alike { alone.gain } else { Estimate { value: -value, ci95: [-high, -low] } });
+    r.bias_dps = Some(Estimate { value: alone.bias.value.to_degrees(), ci95: alone.bias.ci95.map(f64::to_degrees) });
 }
 
 fn curves(

@@ -1,14 +1,14 @@
 //! The gate that every number passes before it leaves the program: finite, possible, counted on enough samples. What does
 //! not pass is no answer, and its reason is said.
 
-use cvg_model::effects::Role as ParameterRole;
+use cvg_model::effects::{EffectId, Role as ParameterRole};
 
 use crate::data::sampling::LARGEST_GAIN;
 use crate::error::Refusal;
-use crate::model::hypothesis::Member;
+use crate::model::hypothesis::{Member, Origin};
 use crate::recording::Instrument;
 use crate::report::calibration::Calibration;
-use crate::report::{Estimate, Report};
+use crate::report::{EffectReport, Estimate, Report};
 
 /// A held-out error is counted on at least this many samples: the stations of a sensor are measurements of their own.
 pub(crate) fn least_held_out(instrument: Instrument) -> usize {
@@ -68,6 +68,12 @@ pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> 
         return refuse(
             format!("the angle is not followed: the model is off by {rms:.0}°"),
             "rate_dps or table_deg, and the signs and scales of the channels, as the campaign says",
+        );
+    }
+    if let Some(what) = report.effects.iter().find_map(undetermined) {
+        return refuse(
+            format!("{what}, and nothing that is possible is left out: the runs do not tell it"),
+            "runs at other rates and in both directions, or longer ones",
         );
     }
     if let Some(what) = calibration.hypothesis.members.iter().find_map(at_its_limit) {
@@ -160,6 +166,18 @@ pub(crate) fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
     UNITS.iter().find(|(factor, _)| usual(k / factor)).map(|(_, what)| *what)
 }
 
+/// A parameter of an effect that the data brought in, with an interval wider than all that the parameter can be.
+fn undetermined(effect: &EffectReport) -> Option<String> {
+    let description = EffectId::from_id(&effect.id).filter(|_| effect.origin != Origin::Declared)?.description();
+    effect.parameters.iter().find_map(|found| {
+        let parameter = description.parameters.iter().find(|p| p.name == found.name && p.unit == found.unit)?;
+        let [low, high] = found.ci95?;
+        (high - low > 2.0 * (parameter.upper - parameter.lower)).then(|| {
+            format!("{} of {} is {:.4} ± {:.1e} {}", found.name, effect.id, found.value, 0.5 * (high - low), found.unit)
+        })
+    })
+}
+
 /// A fitted parameter at a bound that is not its neutral value.
 fn at_its_limit(member: &Member) -> Option<String> {
     let neutral = member.id.neutral::<f64>();
@@ -170,4 +188,32 @@ fn at_its_limit(member: &Member) -> Option<String> {
         .filter(|((p, _), _)| matches!(p.role, ParameterRole::Fitted | ParameterRole::Refined))
         .find(|((p, value), neutral)| value != neutral && (*value == p.lower || *value == p.upper))
         .map(|((p, _), _)| format!("{} of {}", p.name, member.id))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use crate::report::ParameterReport;
+
+    #[test]
+    fn an_effect_of_which_nothing_possible_is_left_out_is_not_told() {
+        let late = |origin, half: f64| EffectReport {
+            id: "angle-latency".into(),
+            origin,
+            parameters: vec![ParameterReport {
+                name: "latency".into(),
+                unit: "s".into(),
+                value: -0.0025,
+                ci95: Some([-0.0025 - half, -0.0025 + half]),
+            }],
+            heldout_rms_deg: None,
+            evidence: String::new(),
+            confounded_with: Vec::new(),
+            separated_by: None,
+        };
+        let said = undetermined(&late(Origin::Discovered, 209_217.0)).unwrap();
+        assert!(said.starts_with("latency of angle-latency is -0.0025 ± 2.1e5 s"), "{said}");
+        assert_eq!(undetermined(&late(Origin::Discovered, 1e-4)), None);
+    }
 }

@@ -1,0 +1,50 @@
+//! What one run of a rate gyroscope tells by itself: its bias and its scale factor, with intervals from its parts.
+//!
+//! A run that turns there and back tells both at once, and what a lag makes beside them is kept out of either. Of a run that
+//! turns one way at one rate they are one number: each is told as it is where the other is that of all runs.
+
+use super::rate_gyroscope::{
+    RateGyroscope, Stretch, T_PARTS, Term, estimate, estimates, jackknife, splits, tell_scale,
+};
+use super::samples::SensorRun;
+use crate::report::Estimate;
+
+/// Bias, rad/s, and scale factor of a run in its own right.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Alone {
+    pub(crate) bias: Estimate,
+    pub(crate) gain: Estimate,
+}
+
+impl RateGyroscope {
+    /// What this run tells by itself; `None` where it has too few rows to leave parts of them out.
+    pub(crate) fn alone(&self, run: &SensorRun) -> Option<Alone> {
+        let stretch = [Stretch::new(run, 0, &self.sensor)?];
+        if tell_scale(&stretch) {
+            let [bias, scale] = found(&stretch, &[Term::Bias, Term::Scale, Term::Lag])?;
+            return Some(Alone { bias, gain: scale.turned(self.sensor.gain) });
+        }
+        let beside = |own: Term| {
+            let every = [Term::Bias, Term::Scale, Term::Lag];
+            let of_all = every.map(|term| if term == own { 0.0 } else { self.value(term) });
+            let [estimate, _] = found(&[stretch[0].without(&every, &of_all)], &[own])?;
+            Some(estimate)
+        };
+        Some(Alone { bias: beside(Term::Bias)?, gain: beside(Term::Scale)?.turned(self.sensor.gain) })
+    }
+}
+
+/// The first two of these terms, of one alone twice the same.
+fn found(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimate; 2]> {
+    let splits = splits(stretch);
+    if splits.len() < 2 {
+        return None;
+    }
+    let values = estimate(stretch, terms);
+    let deviations = jackknife(&estimates(stretch, &splits, terms).0, terms.len());
+    let of = |i: usize| {
+        let half = T_PARTS * deviations[i];
+        Estimate { value: values[i], ci95: [values[i] - half, values[i] + half] }
+    };
+    Some([of(0), of(1.min(terms.len() - 1))])
+}
