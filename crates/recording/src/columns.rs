@@ -12,7 +12,7 @@ use super::error::{Place, ReadError};
 use super::layout::{Field, Layout};
 use super::memory;
 use super::naming::Naming;
-use super::stamp::{self, Stamp};
+use super::stamp::Stamp;
 use super::table::{Missing, Places, Table};
 use super::unknown::Cells;
 
@@ -87,9 +87,9 @@ impl Recording {
                         text: cells.get(row).unwrap_or_default().chars().take(40).collect(),
                         wanted,
                     })?;
-                    if read.are_dates {
+                    if let Some(said) = read.dated {
                         table.units.push((Channel::Time, "s".to_owned()));
-                        table.warnings.push(stamp::COUNTED.to_owned());
+                        table.warnings.push(said);
                     }
                     Values::Numbers(read.values)
                 }
@@ -137,8 +137,8 @@ fn readable(columns: Columns, naming: &Naming, source: &Path) -> Result<(Columns
 /// What the texts of a channel say.
 struct Said {
     values: Vec<f64>,
-    /// they are dates, counted from the first
-    are_dates: bool,
+    /// what there is to say where they are dates or times of day, counted from the first
+    dated: Option<String>,
 }
 
 /// Reads the texts of a channel; else the row of a cell that cannot be read, and what was wanted.
@@ -151,10 +151,11 @@ fn numbers(cells: &Cells, is_time: bool, naming: &Naming) -> Result<Said, (usize
     }
     let number = |(row, text): (usize, &str)| match (first, read(text)) {
         (_, Cell::Missing) => Ok(f64::NAN),
-        (Some(first), _) => first.seconds_to(text.as_bytes()).ok_or((row, "a date, as the times before it")),
+        (Some(first), _) => first.seconds_to(text.as_bytes()).ok_or((row, first.wanted())),
         (None, Cell::Number(value)) => Ok(value),
         (None, Cell::Text) => Err((row, "a number")),
     };
-    let values = cells.iter().enumerate().map(number).collect::<Result<_, _>>()?;
-    Ok(Said { values, are_dates: first.is_some() })
+    let mut values = cells.iter().enumerate().map(number).collect::<Result<Vec<f64>, _>>()?;
+    let dated = first.map(|first| first.over_midnights(&mut values));
+    Ok(Said { values, dated })
 }

@@ -247,8 +247,8 @@ fn unknown_columns_are_kept_and_named_in_one_warning() {
 
 #[test]
 fn text_where_a_number_belongs_is_refused_with_line_column_and_text() {
-    let message = refusal(format!("{HEADER}\n0,500,1,0,0\n1,500,1,OVERRANGE,0\n2,500,1,0,0\n"));
-    assert!(message.contains("line 3, column 4 (`yc_v`): \"OVERRANGE\" is not a number"), "{message}");
+    let message = refusal(format!("{HEADER}\n0,500,1,0,0\n1,500,1,BROKEN,0\n2,500,1,0,0\n"));
+    assert!(message.contains("line 3, column 4 (`yc_v`): \"BROKEN\" is not a number"), "{message}");
     let message = refusal(format!("{HEADER}\n0,500,1.2.3,0,0\n"));
     assert!(message.contains("line 2, column 3 (`xc_v`): \"1.2.3\""), "{message}");
 }
@@ -307,4 +307,45 @@ fn other_kinds_of_file_are_refused_by_their_name() {
         assert!(refusal(bytes).contains(kind), "{kind}");
     }
     assert!(refusal("t_s,xc_v,yc_v\r0,1,0\r").contains("carriage returns"));
+}
+
+/// What lies beyond an instrument's range is a number that is not there, wherever it stands, and is counted.
+#[test]
+fn an_overload_is_a_missing_number_and_is_counted() {
+    let recording =
+        rows("0,500,1,0.1,0\n1,500,OVL,0.1,0\n2,500,-OL,0.1,0\n3,500,1,0.1,Overflow\n4,500,1,0.1,+OVLD\n").unwrap();
+    assert_eq!(recording.t_s, [0.0, 3.0, 4.0]);
+    assert_eq!(recording.dropped.empty_or_nan, Tally { count: 2, first: Some(Place::Line(3)) });
+    assert_eq!(recording.dropped.missing_values[0].1, Tally { count: 2, first: Some(Place::Line(5)) });
+    assert_warns(&recording, "2 of 5 rows dropped");
+    assert_warns(&recording, "`vas_v` is empty or not finite in 2 rows");
+}
+
+#[test]
+fn bars_separate_columns() {
+    let recording = parse("t_s | rate_dps | theta_deg\n0|10|0\n0.1|10|1\n").unwrap();
+    assert_eq!((recording.t_s, recording.theta_deg), (vec![0.0, 0.1], Some(vec![0.0, 1.0])));
+    let message = refusal("time|turns|A|B\n0|0|1|0\n0.1|0|1|0\n");
+    assert!(message.contains("there are `time`, `turns`, `A`, `B`"), "{message}");
+}
+
+#[test]
+fn dates_may_begin_with_the_day_and_times_may_have_none() {
+    let dated = "t_s;rate_dps;theta_deg\n01.03.2026 12:00:00,000;10;0,5\n01.03.2026 12:00:00,010;10;1,5\n";
+    let recording = parse(dated).unwrap();
+    assert_eq!((&recording.t_s[..], recording.theta_deg.as_deref()), (&[0.0, 0.01][..], Some(&[0.5, 1.5][..])));
+    assert_warns(&recording, "times are written as dates");
+    let recording = parse("t_s,rate_dps,theta_deg\n23:59:59.990,10,0\n00:00:00.010,10,1\n00:00:01.010,10,2\n").unwrap();
+    for (found, expected) in recording.t_s.iter().zip([0.0, 0.02, 1.02]) {
+        assert!((found - expected).abs() < 1e-9, "{:?}", recording.t_s);
+    }
+    assert_warns(
+        &recording,
+        "times are written as times of day: `t_s` is counted from the first, in s, past one midnight",
+    );
+    let message = refusal("t_s,rate_dps,theta_deg\n12:00:01,10,0\n12:00:00,10,1\n");
+    assert!(message.contains("the time goes back"), "{message}");
+    // which of the numbers is the month, nothing says
+    let message = refusal("t_s,rate_dps,theta_deg\n01/03/2026 12:00:00,10,0\n");
+    assert!(message.contains("such as 2026-03-01T12:00:00.25Z or 01.03.2026 12:00:00"), "{message}");
 }

@@ -10,7 +10,7 @@ use crate::channel::Channel;
 use crate::error::ReadError;
 use crate::memory::{self, PER_NUMBER, PER_TEXT};
 use crate::naming::Naming;
-use crate::stamp::{self, Stamp};
+use crate::stamp::Stamp;
 
 const KIND: &str = "an HDF5 file";
 /// Groups within groups that are looked into.
@@ -27,16 +27,14 @@ struct Listed {
 /// Reads a recording from the bytes of an HDF5 file.
 pub(super) fn read(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<Recording, ReadError> {
     let damaged = || refuse(source, KIND, "the file is damaged".to_owned());
-    let (arrays, is_dated) = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
+    let (arrays, dated) = memory::guarded(|| decode(bytes, naming, source)).ok_or_else(damaged)??;
     let mut table = table(arrays, naming, source)?;
-    if is_dated {
-        table.warnings.push(stamp::COUNTED.to_owned());
-    }
+    table.warnings.extend(dated);
     admission::admit(table, naming, source)
 }
 
-/// The arrays of a file, and whether the time is one of dates.
-fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>, bool), ReadError> {
+/// The arrays of a file, and what there is to say where the time is one of dates.
+fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>, Option<String>), ReadError> {
     let say = |error: hdf5_pure::Error| refuse(source, KIND, error.to_string());
     let held = bytes.len() as u64;
     let file = hdf5_pure::File::from_bytes(bytes).map_err(say)?;
@@ -57,7 +55,7 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>,
         needed = needed.saturating_add(values.saturating_mul(PER_NUMBER + PER_TEXT + element));
         memory::allow(needed.saturating_add(part.saturating_mul(2 * element)), "its arrays", source)?;
     }
-    let (mut arrays, mut is_dated) = (Vec::new(), false);
+    let (mut arrays, mut dated) = (Vec::new(), None);
     for ((array, name), unneeded) in listed.iter().zip(&names).zip(unneeded) {
         if let Some(why) = unneeded {
             arrays.push((name.clone(), Err(why)));
@@ -67,21 +65,22 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>,
         let dataset = file.dataset(&array.path).map_err(say)?;
         let mut values = dataset.read_f64().ok();
         if values.is_none() {
-            values = dates(&dataset);
-            is_dated |= values.is_some() && naming.channel(name) == Some(Channel::Time);
+            let (seconds, said) = dates(&dataset).unzip();
+            values = seconds;
+            dated = said.filter(|_| naming.channel(name) == Some(Channel::Time)).or(dated);
         }
-        if is_dated && naming.factor(Channel::Time).is_some_and(|factor| factor != 1.0) {
+        if dated.is_some() && naming.factor(Channel::Time).is_some_and(|factor| factor != 1.0) {
             let what = format!("`{name}` is of dates, and the mapping of `t_s` has a factor; wanted none");
             return Err(refuse(source, KIND, what));
         }
         let size: Vec<usize> = array.size.iter().map(|&n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
         push(&mut arrays, name, &size, values, false);
     }
-    Ok((arrays, is_dated))
+    Ok((arrays, dated))
 }
 
-/// Texts that are all dates, as seconds from the first.
-fn dates(dataset: &hdf5_pure::Dataset) -> Option<Vec<f64>> {
+/// Texts that are all dates, as seconds from the first, and what there is to say of them.
+fn dates(dataset: &hdf5_pure::Dataset) -> Option<(Vec<f64>, String)> {
     let count = usize::try_from(dataset.shape().ok()?.into_iter().fold(1, u64::saturating_mul)).ok()?;
     let most = count.checked_mul(LONGEST_DATE)?;
     // those of any length say it in what they refer to
@@ -91,7 +90,9 @@ fn dates(dataset: &hdf5_pure::Dataset) -> Option<Vec<f64>> {
         _ => dataset.read_string().ok()?,
     };
     let first = Stamp::of(texts.first()?.as_bytes())?;
-    texts.iter().map(|text| first.seconds_to(text.as_bytes())).collect()
+    let mut seconds: Vec<f64> = texts.iter().map(|text| first.seconds_to(text.as_bytes())).collect::<Option<_>>()?;
+    let said = first.over_midnights(&mut seconds);
+    Some((seconds, said))
 }
 
 fn look_through(

@@ -39,6 +39,8 @@ pub(crate) enum Cell {
 }
 
 const MISSING: [&str; 7] = ["na", "n/a", "#n/a", "null", "none", "-nan(ind)", "nan(ind)"];
+/// What instruments write, of either sign, for what lies beyond their range.
+const OVERLOAD: [&str; 7] = ["ol", "o.l", "ovl", "ovld", "overload", "overflow", "overrange"];
 
 /// A cell without blanks at its ends.
 pub(super) fn trim(cell: &[u8]) -> &[u8] {
@@ -58,9 +60,20 @@ pub(crate) fn read(cell: &[u8], decimal: Decimal) -> Cell {
     match parsed {
         Some(value) if value.is_finite() => Cell::Number(value),
         Some(_) => Cell::Missing,
-        None if MISSING.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes())) => Cell::Missing,
+        None if says(cell, &MISSING) || says(unsigned(cell), &OVERLOAD) => Cell::Missing,
         None => Cell::Text,
     }
+}
+
+fn unsigned(cell: &[u8]) -> &[u8] {
+    match cell {
+        [b'+' | b'-', rest @ ..] => rest,
+        _ => cell,
+    }
+}
+
+fn says(cell: &[u8], words: &[&str]) -> bool {
+    words.iter().any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
 }
 
 /// The number in a cell with a decimal point; NaN and infinities are numbers here.
@@ -86,7 +99,22 @@ mod tests {
 
     #[test]
     fn empty_cells_and_words_for_nothing_are_missing() {
-        for cell in ["", "  ", "NaN", "nan", "-NaN", "inf", "-Infinity", "NA", "n/a", "null", "1e999"] {
+        for cell in [
+            "",
+            "  ",
+            "NaN",
+            "nan",
+            "-NaN",
+            "inf",
+            "-Infinity",
+            "NA",
+            "n/a",
+            "null",
+            "1e999",
+            "OVL",
+            "-OL",
+            "+Overflow",
+        ] {
             assert_eq!(read(cell.as_bytes(), Decimal::Point), Cell::Missing, "{cell:?}");
         }
     }

@@ -17,7 +17,7 @@ use crate::layout::Layout;
 use crate::naming::Naming;
 use crate::requirement;
 
-const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
+const SEPARATORS: [u8; 4] = [b',', b';', b'\t', b'|'];
 /// Lines among which a header is looked for.
 const MOST_LINES: usize = 200;
 
@@ -248,7 +248,7 @@ fn understand(
         let words: Vec<&str> = one.split_whitespace().collect();
         // an instrument's names have no blanks in them where blanks separate its columns
         if words.len() >= 3 && beneath.is_some_and(|row| separated_by_blanks(row, words.len())) {
-            let wanted = "`,`, `;` or tabs between them, as `tr -s ' ' ','` makes of blanks";
+            let wanted = "`,`, `;`, `|` or tabs between them, as `tr -s ' ' ','` makes of blanks";
             return refuse("the columns are separated by blanks".to_owned(), wanted);
         }
     }

@@ -32,7 +32,7 @@ use super::error::ReadError;
 use super::layout::Field;
 use super::naming::Naming;
 use super::table::{Missing, Table};
-use crate::stamp::{self, Stamp};
+use crate::stamp::Stamp;
 
 /// How much text is taken at a time.
 #[derive(Debug, Clone, Copy)]
@@ -123,7 +123,6 @@ fn read_table(
                 wanted: "the mapping without a factor",
             });
         }
-        head.warnings.push(stamp::COUNTED.to_owned());
     }
     let mut assembly = Assembly::new(dialect, source, head.header_line, head.next_line);
     let mut bytes_parsed = 0;
@@ -153,6 +152,10 @@ fn read_table(
         read_records(text, &dialect, &mut assembly, source, sizes)?;
     }
     let mut table = assembly.finish();
+    if let Some(first) = dialect.first {
+        let times = table.numbers.iter_mut().filter(|column| column.channel == Channel::Time);
+        head.warnings.extend(times.map(|column| first.over_midnights(&mut column.values)));
+    }
     (table.units, table.warnings) = (head.units.clone(), head.warnings.clone());
     if let Some(even) = head.even_times {
         fill_times(&mut table, even);

@@ -6,7 +6,7 @@
 use super::cell::{self, Cell, Decimal};
 use crate::channel::Channel;
 use crate::layout::{Field, Layout};
-use crate::stamp::Stamp;
+use crate::stamp::{self, Stamp};
 use crate::table::Missing;
 use crate::unknown::Cells;
 
@@ -32,10 +32,7 @@ impl Dialect<'_> {
         match read {
             Cell::Number(value) => Ok(Some(value)),
             Cell::Missing => Ok(None),
-            Cell::Text if is_time && self.first.is_some() => {
-                Err("a date with a time of day as the first, all with an offset from UTC or none")
-            }
-            Cell::Text if is_time => Err("a number of seconds, or a date such as 2026-03-01T12:00:00.25Z"),
+            Cell::Text if is_time => Err(self.first.map_or(stamp::WANTED, Stamp::wanted)),
             Cell::Text => Err(self.decimal.wanted()),
         }
     }
