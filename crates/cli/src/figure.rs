@@ -21,6 +21,8 @@ pub(crate) const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub(crate) const GREEN: RGBColor = RGBColor(0, 158, 115);
 pub(crate) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 
+/// Least height of an axis, in its unit: below it is rounding.
+const LEAST_SPAN: f64 = 1e-9;
 /// Width and height, px.
 const SIZE: (u32, u32) = (860, 380);
 
@@ -52,7 +54,9 @@ fn draw<B: DrawingBackend>(
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
             if hi > lo { (lo, hi) } else { (0.0, 1.0) }
         };
-        let ((x0, x1), (y0, y1)) = (span(|p| p.0), span(|p| p.1));
+        let wide =
+            |(lo, hi): (f64, f64)| if hi - lo < LEAST_SPAN { (lo - LEAST_SPAN, hi + LEAST_SPAN) } else { (lo, hi) };
+        let ((x0, x1), (y0, y1)) = (span(|p| p.0), wide(span(|p| p.1)));
         // room above for the names
         let margin = 0.05 * (y1 - y0);
         fonts()?;

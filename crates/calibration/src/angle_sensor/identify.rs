@@ -8,10 +8,11 @@ use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, T_PARTS, Term};
 use super::rate_runs;
 use super::report::{Alone, Errors, Finding, Head, report};
-use super::samples::{Reading, SensorRun, apart, prepare, span};
+use super::samples::{SensorRun, apart, prepare, span};
 use super::screening::believed;
 use super::sensor::other_unit;
 use super::table_fit::Sample;
+use super::units::{of_the_angle, of_the_reference, require_degrees};
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
@@ -46,8 +47,6 @@ const ROWS_PER_HARMONIC: usize = 12;
 const TIME_WAVES: usize = 4;
 /// Turns from which on a time is told from a position by more than a straight line.
 const TURNS_FOR_WAVES: f64 = 1.5;
-/// Values of an angle fill a turn that they span this share of.
-const FILLED: f64 = 0.9;
 /// Rows beyond which the decomposition and the jackknife look at every so many.
 const ENOUGH_ROWS: usize = 3000;
 
@@ -74,6 +73,9 @@ pub(crate) fn identify(
     let mut left_out = Vec::new();
     if rate_gyroscope {
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
+    }
+    if !rate_gyroscope {
+        campaign.runs.iter().try_for_each(|run| require_degrees(run, period))?;
     }
     let mut runs = prepare(campaign, &mut left_out)?;
     runs = if rate_gyroscope {
@@ -110,7 +112,7 @@ fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refu
         return Err(Refusal::new(
             name,
             format!("the angle turns through {:.1}° only", furthest.to_degrees()),
-            match other_unit(runs, period) {
+            match other_unit(runs, period).or_else(|| runs.iter().find_map(of_the_reference)) {
                 Some(unit) => format!("at least half a turn (180°); {unit}"),
                 None => "at least half a turn (180°)".into(),
             },
@@ -128,7 +130,7 @@ fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
         Some(r) => Err(Refusal::no_answer(
             &r.name,
             format!("theta_deg does not follow the reference, which turns through {:.0}°", r.travel_rad().to_degrees()),
-            angle_in_another_unit(r).unwrap_or_else(|| {
+            of_the_angle(r).unwrap_or_else(|| {
                 "the sensor's angle as theta_deg; of a rate in deg/s the integral is one: --map 'theta_deg=integral(COLUMN)'".into()
             }),
         )),
@@ -207,8 +209,7 @@ fn sensor_finding(
         instrument: Instrument::Sensor,
         stated_gain: stated,
         reason: neutral.then(|| {
-            let unit =
-                runs.iter().find_map(angle_in_another_unit).map_or(String::new(), |unit| format!("; wanted: {unit}"));
+            let unit = runs.iter().find_map(of_the_angle).map_or(String::new(), |unit| format!("; wanted: {unit}"));
             format!("nothing that was found predicts rows that were not fitted better than the sensor as it is{unit}")
         }),
         angular_gain: described.angular_gain(stated),
@@ -244,23 +245,6 @@ fn sensor_finding(
         }),
         period,
     })
-}
-
-/// What an angle of a sensor looks like whose values fill a turn in another unit than degrees.
-fn angle_in_another_unit(run: &SensorRun) -> Option<String> {
-    let Reading::Angle(theta) = &run.reading else { return None };
-    let values: Vec<f64> = theta.iter().map(|v| v.to_degrees()).collect();
-    let (size, largest) = (span(&values), values.iter().fold(f64::MIN, |m: f64, v| m.max(*v)));
-    let fills = |turn: f64| size <= turn && size > FILLED * turn;
-    let like = |unit: &str, by: String| {
-        format!("theta_deg in deg: it looks as if in {unit} (theta_deg = \"…{by}\" in [columns], or by --map)")
-    };
-    if fills(std::f64::consts::TAU) {
-        return Some(like("rad", "*57.29578".into()));
-    }
-    let bits = (largest + 1.0).log2().ceil();
-    let counts = values.iter().all(|v| (v - v.round()).abs() < 1e-6) && bits > 9.0 && fills(bits.exp2());
-    counts.then(|| like(&format!("counts of {bits:.0} bits"), format!("/{:.6}", bits.exp2() / 360.0)))
 }
 
 /// Says that the angle and its reference part from one row to the next and stay apart, where they do: each side then has a

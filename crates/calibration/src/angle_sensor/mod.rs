@@ -25,6 +25,7 @@ mod screening;
 mod selection;
 mod sensor;
 mod table_fit;
+mod units;
 
 pub(crate) use identify::{identify, serves};
 pub(crate) use samples::{span, unwrapped};

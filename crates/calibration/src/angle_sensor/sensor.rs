@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
+use super::units::{UNITS, Unit, by_gain};
 use crate::data::track::wrapped;
 use crate::error::Refusal;
 use crate::estimation::linear::NormalEquations;
@@ -20,11 +21,8 @@ const BEGINNING: usize = 50;
 const COARSE: f64 = 0.25;
 const ALIASES: i32 = 3;
 const ALIKE: f64 = 1.5;
-/// Units in which a reference is taken for degrees, and what one is in degrees; those that make a whole number of whole ones.
-const UNITS: [(&str, f64); 3] = [("rad", 57.295_779_513), ("gon", 0.9), ("arc minutes", 1.0 / 60.0)];
-const WHOLE_UNITS: [(&str, f64); 2] = [("turns", 360.0), ("turns per minute", 6.0)];
-/// A gain is one of a unit within this share.
-const SAME_UNIT: f64 = 1e-3;
+/// The unit of a rate that makes a whole number of whole periods.
+const RATES: [Unit; 1] = [("turns per minute", 6.0)];
 
 /// A sensor as it is taken before its errors are known: θ = gain · reference + constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +103,9 @@ impl Sensor {
             ));
         }
         if self.free_gain {
-            let unit = unit_of(gain, &UNITS).unwrap_or_else(|| "the reference is in another unit".into());
+            let angle = runs.iter().any(|run| run.channels().is_none());
+            let unit =
+                by_gain(gain, &UNITS, angle).map_or_else(|| "the reference is in another unit".into(), |u| u.said());
             return Ok(Some(format!(
                 "{gain:.4} periods a turn is no whole number: {unit}, or there is a gear between them, which angular_gain in \
                  campaign.toml states"
@@ -119,7 +119,8 @@ impl Sensor {
                 other.abs()
             )));
         }
-        Ok(unit_of(gain, &WHOLE_UNITS[1..]).filter(|_| rates_alone).map(|unit| {
+        Ok(by_gain(gain, &RATES, false).filter(|_| rates_alone).map(|unit| {
+            let unit = unit.said();
             format!("{gain:.0} periods a turn were taken from rate_dps alone; or {unit}: table_deg, or pole_pairs, would tell")
         }))
     }
@@ -170,26 +171,12 @@ impl Sensor {
     }
 }
 
-/// The unit, of these, in which a reference makes a whole number of periods a turn this gain, in words.
-fn unit_of(gain: f64, units: &[(&str, f64)]) -> Option<String> {
-    let of = |(name, degrees): &(&str, f64)| {
-        let periods = gain / degrees;
-        ((periods / periods.round() - 1.0).abs() < SAME_UNIT && periods > 0.5).then(|| {
-            format!(
-                "it looks as if the reference were in {name} (\"…*{degrees:.7}\" in [columns], or by --map), with {:.0} periods a turn",
-                periods.round()
-            )
-        })
-    };
-    units.iter().find_map(of)
-}
-
 /// What a reference that hardly turns looks like, while the angle goes round: a unit in which it would.
 pub(crate) fn other_unit(runs: &[SensorRun], period: f64) -> Option<String> {
     let turns = |run: &SensorRun| magnitude(std::slice::from_ref(run), period) * run.travel_rad() / period;
     let gain = magnitude(runs, period);
-    let units = [UNITS, [WHOLE_UNITS[0], WHOLE_UNITS[1], UNITS[0]]].concat();
-    unit_of(gain, &units).filter(|_| runs.iter().any(|run| turns(run) > 1.0))
+    let units = [&UNITS[..], &RATES[..]].concat();
+    by_gain(gain, &units, false).filter(|_| runs.iter().any(|run| turns(run) > 1.0)).map(|unit| unit.said())
 }
 
 /// An error followed through its period from the circular mean of its first samples on, about its median.
@@ -234,7 +221,7 @@ fn turning_left(channels: &[[f64; 2]], reference: &[f64], gain: f64) -> f64 {
 }
 
 /// |gain| where none is stated: the slope of the followed angle over the reference, in the run that turns the furthest.
-fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
+pub(super) fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
     let Some(longest) = runs.iter().max_by(|a, b| a.travel_rad().total_cmp(&b.travel_rad())) else { return 1.0 };
     let theta: Vec<f64> = match &longest.reading {
         Reading::Angle(theta) => theta.clone(),

@@ -3,7 +3,7 @@
 use cvg_calibration::Curve;
 use serde_json::json;
 
-use super::figures::{Figure, axis, shorts};
+use super::figures::{Figure, angles_axis, axis, shorts};
 
 /// The closed curve of the channels, and its radius.
 pub(super) fn figures(curve: &Curve) -> [Figure; 2] {
@@ -37,9 +37,8 @@ fn radius(curve: &Curve) -> Figure {
                "marker": {"size": 4, "symbol": symbol, "color": format!("@{name}"), "opacity": 0.8}})
     };
     let traces = vec![points("raw", "circle", &curve.before), points("discovered", "diamond", &curve.after)];
-    let mut layout =
-        json!({"xaxis": axis("angle [deg]"), "yaxis": axis("radius less its mean [%]"), "showlegend": true});
-    layout["xaxis"]["dtick"] = json!(45);
+    let x = angles_axis("angle [deg]", 360.0);
+    let layout = json!({"xaxis": x, "yaxis": axis("radius less its mean [%]"), "showlegend": true});
     let caption = "The radius over the angle: once a turn is an offset, twice a gain or a skew, four times a cubic.";
     Figure::new("radius", "Radius", caption, traces, layout)
 }

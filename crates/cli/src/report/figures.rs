@@ -7,6 +7,7 @@ use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
 
 use super::circle;
+use super::finding::LEAST_DEG;
 use super::tables::name_of_angle;
 use crate::clouds::thinned;
 
@@ -43,8 +44,6 @@ impl Figure {
 const BIAS_POINTS: usize = 1200;
 /// Ticks of an amplitude.
 const TICKS: [f64; 13] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 5.0, 10.0];
-/// Runs that the figure of the energy control can show.
-const DRIVES: usize = 3;
 /// Colours of runs, in turn.
 const INKS: [&str; 7] = ["@declared", "@raw", "@discovered", "@4", "@5", "@6", "@7"];
 
@@ -79,6 +78,15 @@ pub(super) fn shorts(values: impl IntoIterator<Item = f64>) -> Value {
 
 pub(super) fn axis(title: &str) -> Value {
     json!({"title": {"text": title}})
+}
+
+/// An axis of errors of an angle, deg: where all of them are none, it does not show what rounding leaves.
+fn errors_axis<'a>(errors: impl IntoIterator<Item = &'a f64>) -> Value {
+    let mut axis = axis("angle error [deg]");
+    if errors.into_iter().fold(0.0, |m: f64, e| m.max(e.abs())) < LEAST_DEG {
+        axis["range"] = json!([-LEAST_DEG, LEAST_DEG]);
+    }
+    axis
 }
 
 /// An axis of an angle within its period, deg: ticks at multiples of 45° or 90°.
@@ -125,7 +133,8 @@ fn bias(identified: &Identification) -> Figure {
     }
     let over = format!("{} [deg]", name_of_angle(identified));
     let x = angles_axis(&over, identified.calibration.hypothesis.period_rad.to_degrees());
-    let layout = json!({"xaxis": x, "yaxis": axis("angle error [deg]"), "showlegend": false});
+    let y = errors_axis(curves.iter().flat_map(|c| stages.iter().flat_map(|s| s.2(c))));
+    let layout = json!({"xaxis": x, "yaxis": y, "showlegend": false});
     let caption = "Angle minus the best line on held-out data, before any compensation, after the declared effects, and \
                    after all. Switch off a stage to enlarge the others. Where points of a run leave the curve, its error \
                    changes with time too.";
@@ -174,11 +183,11 @@ fn ring_downs(identified: &Identification) -> Option<Figure> {
 }
 
 fn drive(plots: &PlotData) -> Option<Figure> {
-    // the fastest run, the slowest, and those between
+    // the fastest run, the slowest, and one between
     let mut drives: Vec<_> = plots.drives.iter().collect();
     drives.sort_by(|a, b| b.rate_dps.abs().total_cmp(&a.rate_dps.abs()));
     let last = drives.len().checked_sub(1)?;
-    let mut shown: Vec<usize> = [0, last, last / 2].into_iter().take(DRIVES).collect();
+    let mut shown = [0, last / 2, last].to_vec();
     shown.dedup();
     let mut traces = Vec::new();
     for (number, d) in shown.into_iter().map(|at| drives[at]).enumerate() {
@@ -212,10 +221,14 @@ fn harmonics(plots: &PlotData, angle: &str) -> Option<Figure> {
             "hovertemplate": "%{x}: %{y:.6f}°",
         })
     });
-    let layout = json!({
+    let mut layout = json!({
         "barmode": "group", "xaxis": axis(&format!("harmonic of the {angle}")),
         "yaxis": {"title": {"text": "amplitude [deg]"}, "type": "log", "exponentformat": "power", "dtick": 1},
     });
+    let largest = plots.stages.iter().flat_map(|(_, list)| list).fold(0.0, |m: f64, h| m.max(h.amplitude_deg));
+    if largest < LEAST_DEG {
+        layout["yaxis"]["range"] = json!([LEAST_DEG.log10() - 1.0, LEAST_DEG.log10() + 1.0]);
+    }
     let caption =
         "Of the held-out error, at each stage, with 95 % intervals. A bar no higher than its interval is noise.";
     any.then(|| Figure::new("harmonics", "Harmonics", caption, traces.collect(), layout))
@@ -234,7 +247,8 @@ fn residual(plots: &PlotData) -> Option<Figure> {
             })
         })
         .collect();
-    let layout = json!({"xaxis": axis("time [s]"), "yaxis": axis("angle error [deg]")});
+    let y = errors_axis(plots.residuals.iter().flat_map(|r| &r.error_deg));
+    let layout = json!({"xaxis": axis("time [s]"), "yaxis": y});
     let caption = "What is left on held-out data; of each stretch its smallest and its largest value. It should have no \
                    shape.";
     (!traces.is_empty()).then(|| Figure::new("residual", "Residual over time", caption, traces, layout).wide())
@@ -273,7 +287,7 @@ fn histogram(plots: &PlotData) -> Option<Figure> {
         json!({"type": "scatter", "mode": "lines", "name": "normal", "x": x, "y": shorts(h.normal.iter().copied()),
                "line": {"color": "@raw", "width": 2}, "hovertemplate": "%{x:.5f}°: %{y:.1f}"}),
     ];
-    let layout = json!({"bargap": 0, "xaxis": axis("angle error [deg]"), "yaxis": axis("samples")});
+    let layout = json!({"bargap": 0, "xaxis": errors_axis(&h.middle_deg), "yaxis": axis("samples")});
     let caption = "Of the residual, beside a normal distribution of the same mean square.";
     Some(Figure::new("histogram", "Distribution", caption, traces, layout))
 }
@@ -322,7 +336,7 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
             "line": {"color": "@raw", "dash": "dash", "width": 2}, "hoverinfo": "skip",
         }));
     }
-    let y = json!({"title": {"text": "rms in the angle [deg]"}, "rangemode": "tozero"});
+    let y = json!({"title": {"text": "size in the angle [deg]"}, "rangemode": "tozero"});
     let layout = json!({
         "xaxis": {"title": {"text": "rate [deg/s]"}, "domain": [0.0, 0.46]}, "yaxis": y,
         "xaxis2": {"title": {"text": "amplitude [V]"}, "domain": [0.57, 1.0], "anchor": "y2"},
@@ -340,7 +354,8 @@ fn scaling(sizes: &EffectSizes) -> Option<Figure> {
         ""
     };
     let caption = format!(
-        "{}: by its definition it {} and {}.{through} Each point is what one run alone says of it, with its 95 % interval.",
+        "{}: by its definition it {} and {}.{through} Each point is what one run alone says of it, with its 95 % interval; below zero it says \
+         the opposite.",
         sizes.id.description().title,
         law(p, "rate"),
         law(q, "amplitude")

@@ -1,13 +1,15 @@
 //! The finding in one sentence, and numbers as a person says them.
 
 use cvg_calibration::Origin;
-use cvg_calibration::report::{EffectReport, Report};
+use cvg_calibration::report::{EffectReport, Heldout, Report, Status};
 use cvg_model::effects::EffectId;
 
 use crate::report::significant;
 
 /// A residual within this factor of the noise is the noise.
 const AT_THE_NOISE: f64 = 1.2;
+/// An angle error below this is none, deg: no recording of an angle has as many digits, and no figure shows less.
+pub(super) const LEAST_DEG: f64 = 1e-6;
 /// What is unexplained and yet taken out begins its suggestion so.
 const CORRECTED: &str = "corrected as";
 /// Effects that a sentence can name.
@@ -19,6 +21,9 @@ pub(super) fn degrees(value: f64) -> String {
         return "—".into();
     }
     let size = value.abs();
+    if size < 0.5 * LEAST_DEG {
+        return "below 0.000001°".into();
+    }
     let digits = if size >= 10.0 {
         1
     } else if size >= 1.0 {
@@ -71,6 +76,19 @@ pub(super) fn times(before: f64, after: f64) -> String {
     } else {
         format!("{factor:.1} times less")
     }
+}
+
+/// What stands in the place of before and after where nothing is undone; none where something is.
+pub(super) fn of_nothing(status: Status, heldout: &Heldout) -> Option<String> {
+    let raw = heldout.raw.unwrap_or(heldout.declared).rms_deg;
+    let noise = AT_THE_NOISE * heldout.noise_floor_deg.max(LEAST_DEG);
+    (status == Status::Neutral).then(|| {
+        if raw <= noise {
+            format!("nothing to correct: below {} rms angle error", degrees(noise))
+        } else {
+            format!("{} rms angle error, which nothing that was found makes less", degrees(raw))
+        }
+    })
 }
 
 /// The part of the raw error that belongs to the reference and not to the device, rms, deg: it was taken out, and that makes no
@@ -160,6 +178,8 @@ fn list(names: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use cvg_calibration::ErrorSize;
+
     use super::*;
 
     #[test]
@@ -167,7 +187,7 @@ mod tests {
         assert_eq!(degrees(29.63), "29.6°");
         assert_eq!(degrees(0.26789), "0.268°");
         assert_eq!(degrees(0.0011), "0.00110°");
-        assert_eq!(degrees(f64::NAN), "—");
+        assert_eq!([degrees(f64::NAN), degrees(0.0), degrees(1e-6)], ["—", "below 0.000001°", "0.000001°"]);
     }
 
     #[test]
@@ -185,6 +205,19 @@ mod tests {
         assert_eq!(times(0.27, 0.0011), "245 times less");
         assert_eq!(times(0.3, 0.1), "3.0 times less");
         assert_eq!(times(0.3, 0.0), "no factor");
+    }
+
+    #[test]
+    fn where_nothing_is_undone_the_headline_has_no_before_and_after() {
+        let of = |raw: f64, noise_floor_deg: f64| {
+            let size = |rms_deg| ErrorSize { rms_deg, peak_deg: rms_deg, peak_to_peak_deg: rms_deg };
+            Heldout { raw: Some(size(raw)), declared: size(raw), discovered: size(raw), noise_floor_deg }
+        };
+        let said = |raw, floor| of_nothing(Status::Neutral, &of(raw, floor)).unwrap_or_default();
+        assert_eq!(said(1e-15, 1e-15), "nothing to correct: below 0.000001° rms angle error");
+        assert_eq!(said(0.011, 0.01), "nothing to correct: below 0.0120° rms angle error");
+        assert_eq!(said(3.0, 0.01), "3.00° rms angle error, which nothing that was found makes less");
+        assert_eq!(of_nothing(Status::Answered, &of(3.0, 0.01)), None);
     }
 
     #[test]

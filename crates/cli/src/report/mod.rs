@@ -110,14 +110,16 @@ fn finish(h: &mut String, json: &str, schema: &str, footer: &str, figures: &[Fig
 fn headline(h: &mut String, identified: &Identification) {
     let held = &identified.report.heldout;
     let before = held.raw.unwrap_or(held.declared);
-    let _ = write!(
-        h,
-        "<p class=\"headline\">{} <span class=\"arrow\">→</span> {} rms angle error, {}</p><p class=\"finding\">{}</p>",
-        finding::degrees(before.rms_deg),
-        finding::degrees(held.discovered.rms_deg),
-        times(of_the_device(&identified.report), held.discovered.rms_deg),
-        escape(&finding(&identified.report))
-    );
+    let said = finding::of_nothing(identified.report.status, held).unwrap_or_else(|| {
+        format!(
+            "{} <span class=\"arrow\">→</span> {} rms angle error, {}",
+            finding::degrees(before.rms_deg),
+            finding::degrees(held.discovered.rms_deg),
+            times(of_the_device(&identified.report), held.discovered.rms_deg)
+        )
+    });
+    let sentence = escape(&finding(&identified.report));
+    let _ = write!(h, "<p class=\"headline\">{said}</p><p class=\"finding\">{sentence}</p>");
 }
 
 fn warnings(h: &mut String, list: &[String]) {

@@ -35,6 +35,14 @@
       layout.xaxis = { ...layout.xaxis, showticklabels: false };
       layout.margin = { l: 150, r: 8, t: 16, b: 24 };
     }
+    // nor for two panels beside each other: the second goes below the first
+    if (layout.xaxis2 && layout.xaxis.domain && (width || innerWidth) < NARROW_PX) {
+      for (const [x, y, domain] of [["xaxis", "yaxis", [0.6, 1]], ["xaxis2", "yaxis2", [0, 0.4]]]) {
+        layout[x] = { ...layout[x], domain: [0, 1], nticks: 6 };
+        layout[y] = { ...layout[y], domain, nticks: 5 };
+      }
+      layout.height = 560;
+    }
     return {
       traces,
       layout: {
@@ -52,6 +60,8 @@
     const { traces, layout } = styled(figure, name, width);
     const off = hidden.get(figure.id);
     if (off) for (const trace of traces) if (off.has(trace.meta)) trace.visible = false;
+    // a figure that has a height of its own makes room for itself
+    target.style.height = layout.height ? layout.height + "px" : "";
     return Plotly.react(target, traces, layout, options).then(() => { target.dataset.drawn = "true"; });
   };
   const drawn = () => figures.filter((f) => document.getElementById("plot-" + f.id).dataset.drawn);

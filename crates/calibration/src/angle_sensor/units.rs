@@ -1,0 +1,205 @@
+//! In which unit an angle looks to be that is not in degrees: by the turn that its values fill where they wrap, and by how far
+//! it goes beside another, which a whole number of periods a turn makes one of few numbers.
+
+use super::samples::{Reading, SensorRun, span};
+use super::sensor::magnitude;
+use crate::error::Refusal;
+use crate::estimation::statistics::median;
+use crate::recording::Run;
+
+/// A unit of an angle and what one is in degrees.
+pub(super) type Unit = (&'static str, f64);
+
+/// Units that are taken for degrees.
+pub(super) const UNITS: [Unit; 7] = [
+    ("turns", 360.0),
+    ("rad", 57.295_779_513),
+    ("gon", 0.9),
+    ("mrad", 0.057_295_779_513),
+    ("arc minutes", 1.0 / 60.0),
+    ("mdeg", 1e-3),
+    ("arc seconds", 1.0 / 3600.0),
+];
+/// A gain is one of a unit within this share, and of so many periods a turn at most: of more, any number is near a whole one.
+const SAME_UNIT: f64 = 1e-3;
+const MOST_PERIODS: f64 = 64.0;
+/// Values of an angle fill a turn that they span this share of; they wrap where a step is this share of that, and steps are
+/// small where most are within a tenth.
+const FILLED: f64 = 0.9;
+const WRAPS: f64 = 0.5;
+const SMALL: f64 = 0.1;
+const TURN_DEG: f64 = 360.0;
+
+/// Which of the two columns is in another unit, and the periods a turn that it then makes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Found {
+    column: &'static str,
+    unit: Unit,
+    periods: f64,
+}
+
+impl Found {
+    /// The next step in words.
+    pub(super) fn said(&self) -> String {
+        let Self { column, unit: (name, degrees), periods } = self;
+        let whose = if *column == ANGLE { "the angle" } else { "the reference" };
+        let s = if *periods == 1.0 { "" } else { "s" };
+        format!(
+            "it looks as if {whose} were in {name} (\"…{}\" in [columns], or by --map), with {periods:.0} period{s} a turn",
+            factor(*degrees)
+        )
+    }
+}
+
+/// What takes a unit to degrees, as a mapping has it: seven digits, or a whole divisor.
+fn factor(degrees: f64) -> String {
+    let parts = degrees.recip().round();
+    if (degrees * parts - 1.0).abs() < 1e-9 {
+        return format!("/{parts:.0}");
+    }
+    let seven: f64 = format!("{degrees:.6e}").parse().unwrap_or(degrees);
+    format!("*{seven}")
+}
+
+const ANGLE: &str = "theta_deg";
+const REFERENCE: &str = "table_deg";
+
+/// The unit, of these, in which a reference makes a whole number of periods a turn of this gain; of several the one with the
+/// fewest. The angle is asked as well where `angle` says that there is one.
+pub(super) fn by_gain(gain: f64, units: &[Unit], angle: bool) -> Option<Found> {
+    let whole = |column, unit: Unit, periods: f64| {
+        let nearest = periods.round();
+        ((1.0..=MOST_PERIODS).contains(&nearest) && (periods / nearest - 1.0).abs() < SAME_UNIT).then_some(Found {
+            column,
+            unit,
+            periods: nearest,
+        })
+    };
+    let of_reference = units.iter().filter_map(|u| whole(REFERENCE, *u, gain / u.1));
+    let of_angle = units.iter().filter(|_| angle).filter_map(|u| whole(ANGLE, *u, gain * u.1));
+    of_reference.chain(of_angle).min_by(|a, b| a.periods.total_cmp(&b.periods))
+}
+
+/// The unit of which the values of an angle fill a turn over and over; none of one in degrees.
+fn by_turn(values: &[f64]) -> Option<Unit> {
+    let size = span(values);
+    let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let wraps = steps.iter().any(|s| *s > WRAPS * size) && median(&mut steps) < SMALL * size;
+    let fills = |turn: f64| size <= turn && size > FILLED * turn;
+    (wraps && !fills(TURN_DEG)).then(|| UNITS.into_iter().find(|(_, degrees)| fills(TURN_DEG / degrees)))?
+}
+
+/// The unit of which a reference that hardly turns fills a turn over and over.
+pub(super) fn of_the_reference(run: &SensorRun) -> Option<String> {
+    let values: Vec<f64> = run.reference_rad.iter().map(|a| a.to_degrees()).collect();
+    by_turn(&values).map(|unit| Found { column: REFERENCE, unit, periods: 1.0 }.said())
+}
+
+/// Refuses columns whose values are none of an angle in degrees: they wrap at another turn, or go round from row to row.
+///
+/// # Errors
+/// With the unit that would make degrees of them, where there is one.
+pub(super) fn require_degrees(run: &Run, period: f64) -> Result<(), Refusal> {
+    let Ok(settled) = run.settled() else { return Ok(()) };
+    let name = run.file.display().to_string();
+    let of = |column: &Option<Vec<f64>>| column.as_ref().map(|v| v[settled.clone()].to_vec());
+    let (table, theta) = (of(&run.recording.table_deg), of(&run.recording.theta_deg));
+    for (column, values) in [(REFERENCE, &table), (ANGLE, &theta)] {
+        // a turn below one in degrees may be a part of one
+        let larger = values.as_ref().and_then(|v| by_turn(v)).filter(|(_, degrees)| *degrees < 1.0);
+        if let Some((unit, degrees)) = larger {
+            return Err(Refusal::no_answer(
+                &name,
+                format!("{column} wraps at a turn of {unit}"),
+                format!("degrees: {column} = \"…{}\" in [columns], or by --map", factor(degrees)),
+            ));
+        }
+    }
+    let round =
+        |v: &Vec<f64>| median(&mut v.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>()) > 0.5 * TURN_DEG;
+    let Some(column) = [(REFERENCE, &table), (ANGLE, &theta)].into_iter().find(|(_, v)| v.as_ref().is_some_and(round))
+    else {
+        return Ok(());
+    };
+    let followed = |v: &Option<Vec<f64>>, at: &str| -> Option<Vec<f64>> {
+        let radians = v.as_ref()?.iter().map(|d| d.to_radians());
+        Some(if at == column.0 { radians.collect() } else { super::samples::unwrapped(radians, period) })
+    };
+    let gain = match (followed(&table, REFERENCE), followed(&theta, ANGLE)) {
+        (Some(table), Some(theta)) => crate::estimation::statistics::line(&table, &theta).0.abs(),
+        (Some(table), None) => SensorRun::new(run.clone(), 0, None)
+            .map_or(0.0, |r| magnitude(&[SensorRun { reference_rad: table, ..r }], period)),
+        _ => 0.0,
+    };
+    let unit = by_gain(gain, &UNITS, theta.is_some()).filter(|found| found.column == column.0);
+    Err(Refusal::no_answer(
+        &name,
+        format!("{} turns by more than half a turn from row to row", column.0),
+        unit.map_or_else(
+            || "angles in degrees, and rows closer together".into(),
+            |found| format!("degrees: {}", found.said()),
+        ),
+    ))
+}
+
+/// What an angle of a sensor looks like that does not follow its reference, and whose values fill a turn in another unit than
+/// degrees, or go beside the reference as those of one.
+pub(super) fn of_the_angle(run: &SensorRun) -> Option<String> {
+    let Reading::Angle(theta) = &run.reading else { return None };
+    let values: Vec<f64> = theta.iter().map(|v| v.to_degrees()).collect();
+    let like = |unit: &str, by: String| {
+        format!("theta_deg in deg: it looks as if in {unit} (theta_deg = \"…{by}\" in [columns], or by --map)")
+    };
+    let (size, largest) = (span(&values), values.iter().fold(f64::MIN, |m: f64, v| m.max(*v)));
+    let fills = |turn: f64| size <= turn && size > FILLED * turn;
+    let (slope, start) = crate::estimation::statistics::line(&run.reference_rad, theta);
+    let left = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - slope * a - start);
+    let follows = span(&left.collect::<Vec<_>>()) < SMALL * span(theta);
+    let beside = by_gain(slope.abs(), &UNITS, true).filter(|found| follows && found.column == ANGLE);
+    let unit = by_turn(&values).or(beside.map(|found| found.unit));
+    if let Some((unit, degrees)) = unit.or_else(|| fills(std::f64::consts::TAU).then_some(UNITS[1])) {
+        return Some(like(unit, factor(degrees)));
+    }
+    let bits = (largest + 1.0).log2().ceil();
+    let counts = values.iter().all(|v| (v - v.round()).abs() < 1e-6) && bits > 9.0 && fills(bits.exp2());
+    counts.then(|| like(&format!("counts of {bits:.0} bits"), format!("/{:.6}", bits.exp2() / 360.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(gain: f64, angle: bool) -> Option<(&'static str, &'static str, f64)> {
+        by_gain(gain, &UNITS, angle).map(|f| (f.column, f.unit.0, f.periods))
+    }
+
+    #[test]
+    fn a_unit_is_named_by_the_ratio_that_is_found() {
+        assert_eq!(said(360.0, false), Some((REFERENCE, "turns", 1.0)));
+        assert_eq!(said(12.0 * 57.295_78, false), Some((REFERENCE, "rad", 12.0)));
+        assert_eq!(said(0.9, false), Some((REFERENCE, "gon", 1.0)));
+        assert_eq!(said(1.0 / 60.0, true), Some((REFERENCE, "arc minutes", 1.0)));
+        assert_eq!(said(1.0 / 360.0, true), Some((ANGLE, "turns", 1.0)));
+        assert_eq!(said(1.0 / 0.9, true), Some((ANGLE, "gon", 1.0)));
+        assert_eq!(said(1.0 / 0.9, false), None);
+        // near a whole number of some unit as any number is
+        assert_eq!(said(39.736_3, false), None);
+    }
+
+    #[test]
+    fn a_factor_is_one_that_a_mapping_takes() {
+        assert_eq!([360.0, 57.295_779_513, 0.9, 1.0 / 3600.0].map(factor), ["*360", "*57.29578", "*0.9", "/3600"]);
+    }
+
+    #[test]
+    fn values_that_wrap_tell_the_turn_that_they_fill() {
+        let wrapped = |turn: f64| (0..500).map(|i| (0.013 * turn * f64::from(i)) % turn).collect::<Vec<f64>>();
+        assert_eq!(by_turn(&wrapped(360.0)), None);
+        for (turn, unit) in [(1.0, "turns"), (6.283_185, "rad"), (400.0, "gon"), (21_600.0, "arc minutes")] {
+            assert_eq!(by_turn(&wrapped(turn)).map(|u| u.0), Some(unit));
+        }
+        // there and back, or one station after the other
+        assert_eq!(by_turn(&(0..500).map(|i| 400.0 * (0.01 * f64::from(i)).sin().abs()).collect::<Vec<_>>()), None);
+        assert_eq!(by_turn(&[0.0, 380.0, 0.0, 380.0]), None);
+    }
+}

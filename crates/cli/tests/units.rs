@@ -1,0 +1,82 @@
+//! Angles that are not in degrees, and angles without an error.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod support;
+
+use std::ffi::OsStr;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use support::{Outcome, cvg};
+use tempfile::TempDir;
+
+/// A sensor turned by hand: its angle and that of its table, each in a unit of so many degrees, over and over or at a stretch.
+fn turned(folder: &TempDir, [table, angle]: [f64; 2], wrap: bool, error_deg: f64) -> PathBuf {
+    let mut text = String::from("t_s,table_deg,theta_deg\n");
+    for i in 0..3000 {
+        let t = 0.01 * f64::from(i);
+        let shaft = 36.0 * t + 20.0 * (0.5 * t).sin();
+        let read = shaft + error_deg * (shaft.to_radians().sin() + 0.03 * (1e4 * t).sin());
+        let [shaft, read] = [shaft, read].map(|v: f64| if wrap { v.rem_euclid(360.0) } else { v });
+        let _ = writeln!(text, "{t:.2},{:.9},{:.9}", shaft / table, read / angle);
+    }
+    let path = folder.path().join("turned.csv");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+fn identified(file: &Path, more: &[&OsStr]) -> Outcome {
+    let mut arguments = vec![OsStr::new("identify"), file.as_os_str(), OsStr::new("--sensor")];
+    arguments.extend(more);
+    cvg(&arguments)
+}
+
+/// The unit that fits is named, whichever it is, with a factor that a mapping takes.
+#[test]
+fn an_angle_in_another_unit_is_told_the_factor_that_takes_it_to_degrees() {
+    let folder = TempDir::new().unwrap();
+    let units = [
+        ("turns", 360.0, "*360"),
+        ("rad", 1f64.to_degrees(), "*57.29578"),
+        ("gon", 0.9, "*0.9"),
+        ("mrad", 1e-3f64.to_degrees(), "*0.05729578"),
+        ("arc seconds", 1.0 / 3600.0, "/3600"),
+        ("mdeg", 1e-3, "/1000"),
+    ];
+    for (name, degrees, by) in units {
+        for (column, scales) in [("table_deg", [degrees, 1.0]), ("theta_deg", [1.0, degrees])] {
+            for wrap in [false, true] {
+                let file = turned(&folder, scales, wrap, 0.3);
+                let Outcome { stdout, stderr, .. } = identified(&file, &[]);
+                let said = stdout + &stderr;
+                assert!(said.contains(&format!("…{by}\"")), "{column} in {name}, wrapping {wrap}: {said}");
+                let wrong = units.iter().find(|(other, ..)| *other != name && said.contains(&format!(" {other} (")));
+                assert_eq!(wrong, None, "{column} in {name}, wrapping {wrap}: {said}");
+                let map = format!("{column}={column}{by}");
+                let mapped = identified(&file, &[OsStr::new("--map"), OsStr::new(&map)]);
+                assert_eq!(mapped.status, 0, "{map}: {}", mapped.stderr);
+                assert!(!mapped.stdout.contains("whole number"), "{map}: {}", mapped.stdout);
+            }
+        }
+    }
+}
+
+/// What rounding leaves of no error is no before and after, and no axis shows it.
+#[test]
+fn an_angle_without_an_error_leaves_nothing_to_correct() {
+    let folder = TempDir::new().unwrap();
+    let file = turned(&folder, [1.0, 1.0], false, 0.0);
+    let out = folder.path().join("out");
+    let told = identified(&file, &[OsStr::new("--out"), out.as_os_str()]);
+    assert_eq!(told.status, 1, "{}", told.stderr);
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("<p class=\"headline\">nothing to correct: below 0.000001° rms angle error</p>"));
+    let figures = page.split_once("id=\"figures\">").unwrap().1.split_once("</script>").unwrap().0;
+    let figures: Vec<Value> = serde_json::from_str(figures).unwrap();
+    for (id, axis) in [("bias", "yaxis"), ("residual", "yaxis")] {
+        let figure = figures.iter().find(|f| f["id"] == id).unwrap();
+        assert_eq!(figure["layout"][axis]["range"], serde_json::json!([-1e-6, 1e-6]), "{id}");
+    }
+}
