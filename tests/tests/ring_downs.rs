@@ -242,3 +242,24 @@ fn energy_and_quadrature_command_exchanged_in_the_rotations_are_no_answer() {
     let refused = identified(campaign).unwrap_err().to_string();
     assert!(refused.contains("vas_v and vqc_v in their places"), "{refused}");
 }
+
+/// A rotation whose rate lost its sign looks at first as if the ring-downs were another device's.
+#[test]
+fn a_sign_that_is_lost_in_a_rotation_is_not_blamed_on_a_ring_down() {
+    let mut campaign = recorded(settings());
+    let run = campaign.runs.iter_mut().find(|r| r.file.ends_with("rot-500.csv")).unwrap();
+    run.recording.rate_dps.as_mut().unwrap().iter_mut().for_each(|v| *v = v.abs());
+    let outcome = identified(campaign);
+    let (said, runs) = match &outcome {
+        Ok(i) => (i.report.warnings.join("\n"), i.report.runs.clone()),
+        Err(refusal) => (refusal.to_string(), Vec::new()),
+    };
+    assert!(said.contains("rot-500.csv"), "{said}");
+    assert!(!said.contains("ringdown-"), "{said}");
+    let innocent = runs.iter().filter(|r| !r.file.ends_with("rot-500.csv"));
+    assert!(innocent.clone().all(|r| r.agrees != Some(false)), "{:?}", innocent.collect::<Vec<_>>());
+    if let Ok(i) = outcome {
+        assert!(i.report.actuation_gain_ratio.is_none_or(|e| holds(&e, RATIO)), "{:?}", i.report.actuation_gain_ratio);
+        assert!((i.report.detection_gain_ratio.unwrap().value - 1.0132).abs() < 1e-3);
+    }
+}

@@ -3,6 +3,7 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
@@ -99,6 +100,22 @@ fn identify_with_json_prints_the_report_and_nothing_else() {
     assert_eq!(said.trim_end(), written.trim_end());
     let alone = cvg_ok(&[OsStr::new("identify"), campaign.as_os_str(), OsStr::new("--json")]);
     assert_eq!(alone, said, "the same campaign gives the same report");
+}
+
+/// No clock, no order of threads and no folder goes into an answer.
+#[test]
+fn the_same_campaign_gives_the_same_files_byte_for_byte() {
+    let bench = Bench::small();
+    let campaign = bench.campaign();
+    let written = ["one", "two"].map(|name| {
+        let out = bench.path(name);
+        cvg_ok(&[OsStr::new("identify"), campaign.as_os_str(), OsStr::new("--out"), out.as_os_str()]);
+        let files = fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+        files.map(|f| (f.file_name().unwrap().to_owned(), fs::read(f).unwrap())).collect::<BTreeMap<_, _>>()
+    });
+    let names = ["calibration.toml", "report.html", "report.json"];
+    assert!(names.iter().all(|name| written[0].contains_key(OsStr::new(name))), "{:?}", written[0].keys());
+    assert!(written[0] == written[1], "{:?}", written.map(|w| w.into_keys().collect::<Vec<_>>()));
 }
 
 #[test]

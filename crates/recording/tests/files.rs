@@ -229,3 +229,51 @@ fn time_stamps_in_parquet_are_times_counted_from_the_first() {
         assert!(Recording::read_named(&path, &scaled).unwrap_err().to_string().contains("has a factor"));
     }
 }
+
+/// Numbers of any size are written as every reader of tables takes them, and read back as they were; what is none is empty.
+#[test]
+fn numbers_are_written_as_other_readers_take_them() {
+    let values =
+        [0.0, -0.0, 1.0, -2.5, 1e-9, -3.25e-300, 1e5, 123_456_789.125, 1e16, -7e22, f64::MAX, 5e-324, f64::NAN];
+    let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
+    let columns = (Some(vec![1.0; values.len()]), Some(vec![0.0; values.len()]));
+    let recording =
+        Recording { t_s, xc_v: columns.0, yc_v: columns.1, temp_c: Some(values.to_vec()), ..Recording::default() };
+    let mut text = vec![];
+    recording.write_csv(&mut text).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let at = text.lines().next().unwrap().split(',').position(|name| name == "temp_c").unwrap();
+    for (line, value) in text.lines().skip(1).zip(values) {
+        let cell = line.split(',').nth(at).unwrap();
+        if value.is_nan() {
+            assert_eq!(cell, "");
+            continue;
+        }
+        let is_plain = |c: char| c.is_ascii_digit() || matches!(c, '-' | '.' | 'e');
+        assert!(cell.chars().all(is_plain) && cell.starts_with(|c: char| c == '-' || c.is_ascii_digit()), "{cell}");
+        assert_eq!(cell.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()), "{cell}");
+    }
+}
+
+/// What pandas takes for a number is one here, in a row of plain numbers or not.
+#[test]
+fn numbers_are_read_as_other_readers_write_them() {
+    let cells = [
+        ("1e3", 1e3),
+        ("+1", 1.0),
+        (" 1 ", 1.0),
+        ("1.", 1.0),
+        (".5", 0.5),
+        ("-0", -0.0),
+        ("1E-05", 1e-5),
+        ("\"2\"", 2.0),
+    ];
+    let rows: String = cells.iter().enumerate().map(|(i, (cell, _))| format!("{i},10,{cell}\n")).collect();
+    let recording =
+        Recording::parse_csv(format!("t_s,rate_dps,theta_deg\n{rows}").as_bytes(), Path::new("a.csv")).unwrap();
+    assert_eq!(recording.theta_deg.unwrap(), cells.map(|(_, value)| value));
+    // thousands are none: a comma separates columns, or is the decimal one
+    let grouped = "t_s;rate_dps;theta_deg\n0;10;1,000.5\n";
+    let said = Recording::parse_csv(grouped.as_bytes(), Path::new("a.csv")).unwrap_err().to_string();
+    assert!(said.contains("line 2, column 3") && said.contains("1,000.5"), "{said}");
+}

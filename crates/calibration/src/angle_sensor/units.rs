@@ -195,7 +195,8 @@ mod tests {
     fn values_that_wrap_tell_the_turn_that_they_fill() {
         let wrapped = |turn: f64| (0..500).map(|i| (0.013 * turn * f64::from(i)) % turn).collect::<Vec<f64>>();
         assert_eq!(by_turn(&wrapped(360.0)), None);
-        for (turn, unit) in [(1.0, "turns"), (6.283_185, "rad"), (400.0, "gon"), (21_600.0, "arc minutes")] {
+        for (turn, unit) in [(1.0, "turns"), (std::f64::consts::TAU, "rad"), (400.0, "gon"), (21_600.0, "arc minutes")]
+        {
             assert_eq!(by_turn(&wrapped(turn)).map(|u| u.0), Some(unit));
         }
         // there and back, or one station after the other

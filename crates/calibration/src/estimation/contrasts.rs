@@ -92,6 +92,16 @@ impl Dataset {
         speeds_differ(&self.stretches())
     }
 
+    /// The table's own angle was recorded in all runs.
+    pub(crate) fn has_table(&self) -> bool {
+        self.tracks.iter().all(|p| p.track.has_table)
+    }
+
+    /// The temperature was recorded in all runs.
+    pub(crate) fn has_temperature(&self) -> bool {
+        self.tracks.iter().all(|p| p.track.has_temperature())
+    }
+
     /// What the fitted runs have in common.
     pub(crate) fn alike(&self) -> Alike {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
@@ -103,6 +113,7 @@ impl Dataset {
             speed: !self.speeds_differ(),
             amplitude: ends.1 < (1.0 + SAME_AMPLITUDE) * ends.0,
             no_ring_downs: self.ring_down_runs.is_empty(),
+            no_table: !self.has_table(),
         }
     }
 

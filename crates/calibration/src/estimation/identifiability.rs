@@ -54,6 +54,8 @@ pub(crate) struct Alike {
     pub(crate) amplitude: bool,
     /// there are no ring-downs
     pub(crate) no_ring_downs: bool,
+    /// the table's own angle was not recorded in all of them
+    pub(crate) no_table: bool,
 }
 
 /// The run that would separate two effects: what the campaign lacks of that in which their shares scale apart.
@@ -71,9 +73,24 @@ pub(crate) fn separated_by(one: EffectId, other: EffectId, alike: Alike) -> &'st
         "a rotation run in the opposite direction"
     } else if a.scaling.amplitude != b.scaling.amplitude && alike.amplitude {
         "a rotation run at another amplitude"
-    } else if input.contains(&true) {
+    } else if input.contains(&true) && alike.no_table {
         "a rotation run with the table angle recorded (table_deg), or at another rate"
+    } else if input.contains(&true) {
+        "a rotation run at another rate"
     } else {
         "longer rotation runs"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_recorded_already_is_not_asked_for() {
+        let differ = Alike { direction: false, speed: false, amplitude: false, no_ring_downs: false, no_table: true };
+        let advice = |alike| separated_by(EffectId::TableHarmonic, EffectId::HarmonicN, alike);
+        assert_eq!(advice(differ), "a rotation run with the table angle recorded (table_deg), or at another rate");
+        assert_eq!(advice(Alike { no_table: false, ..differ }), "a rotation run at another rate");
     }
 }

@@ -74,6 +74,24 @@ fn class(m: &Member) -> (&'static str, Option<u32>, Option<f64>) {
     }
 }
 
+/// What would tell where an error that follows the table comes from.
+fn of_the_table(is_recorded: bool) -> &'static str {
+    if is_recorded {
+        "turn the instrument on the table: what is the table's stays where it is"
+    } else {
+        "record the table angle (table_deg), or turn the instrument on the table"
+    }
+}
+
+/// What would tell where a drift comes from.
+fn of_a_drift(temperature_is_recorded: bool) -> &'static str {
+    if temperature_is_recorded {
+        "a longer settling time, or runs at other temperatures"
+    } else {
+        "a longer settling time, and the temperature recorded"
+    }
+}
+
 /// Lists what the residual still holds.
 pub(crate) fn unexplained(
     dataset: &Dataset,
@@ -92,7 +110,7 @@ pub(crate) fn unexplained(
     };
     for (of, class, suggestion) in [
         (Follows::Pattern, "pattern-harmonic", "runs at other rates and amplitudes would show how it scales"),
-        (Follows::Table, "table-harmonic", "record the table angle (table_deg), or turn the instrument on the table"),
+        (Follows::Table, "table-harmonic", of_the_table(dataset.has_table())),
     ] {
         let most = resolved_harmonics(on_fit, of, 64);
         for (n, power) in strongest_harmonics(on_fit, of, most, |_| 1.0).into_iter().take(3) {
@@ -128,7 +146,7 @@ pub(crate) fn unexplained(
             n: None,
             frequency_hz: None,
             rms_deg: rms(drift).to_degrees(),
-            suggestion: "a longer settling time, and the temperature recorded".into(),
+            suggestion: of_a_drift(dataset.has_temperature()).into(),
         });
     }
     let left = heldout.mean_square().sqrt();
@@ -142,4 +160,15 @@ pub(crate) fn unexplained(
         });
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_recorded_already_is_not_asked_for() {
+        assert!(of_the_table(false).contains("table_deg") && !of_the_table(true).contains("record"));
+        assert!(of_a_drift(false).contains("recorded") && !of_a_drift(true).contains("record"));
+    }
 }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use cvg_calibration::Identification;
 use cvg_calibration::report::{EffectReport, Estimate, ParameterReport, Report, RunReport, Temperature};
+use cvg_model::effects::EffectId;
 
 use super::escape;
 use super::figures::run_name;
@@ -178,6 +179,14 @@ fn parameter(h: &mut String, e: &EffectReport, p: &ParameterReport) {
         None => (significant(p.value), "set by a search".to_owned()),
     };
     row(h, &[&name, &value, &ends, &escape(&p.unit)]);
+    if e.id == EffectId::DetectionSkew.description().id {
+        let degrees = |v: f64| v.atan().to_degrees();
+        let (value, ends) = match p.ci95.map(|c| interval(degrees(p.value), c.map(degrees))) {
+            Some([value, low, high]) => (value, format!("{low} … {high}")),
+            None => (significant(degrees(p.value)), String::new()),
+        };
+        row(h, &[&format!("{}: axes off a right angle by", escape(&e.id)), &value, &ends, "deg"]);
+    }
 }
 
 fn correlations(h: &mut String, identified: &Identification) {
