@@ -10,7 +10,7 @@ use serde_json::json;
 use super::circle;
 use super::figures::{self, Figure, axis, shorts};
 use super::finding::{degrees, interval, times};
-use super::tables::{row, runs, table, temperature};
+use super::tables::{parameter, row, runs, table, temperature};
 use super::{begin, draw, escape, finish, warnings};
 use crate::Failure;
 use crate::report::significant;
@@ -95,12 +95,7 @@ fn parameters(h: &mut String, r: &Survey) {
         };
         let all = r.effects.iter().flat_map(|e| e.parameters.iter().map(move |p| (e, p)));
         for (e, p) in all.filter(|(_, p)| once(&p.name)) {
-            let name = format!("{}: {}", escape(&e.id), escape(&p.name));
-            let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
-                Some([value, low, high]) => (value, format!("{low} … {high}")),
-                None => (significant(p.value), "as it was read".to_owned()),
-            };
-            row(h, &[&name, &value, &ends, &escape(&p.unit)]);
+            parameter(h, e, p, "as it was read");
         }
     });
 }

@@ -148,19 +148,21 @@ fn parameters(h: &mut String, identified: &Identification) {
                     let size = format!("largest {} at {}", significant(largest.1), largest.0);
                     row(h, &[ANGLE_TABLE, &format!("{order} harmonics"), &size, "rad"]);
                 }
-                None => e.parameters.iter().filter(|p| once(&p.name)).for_each(|p| parameter(h, e, p)),
+                None => e.parameters.iter().filter(|p| once(&p.name)).for_each(|p| parameter(h, e, p, SEARCHED)),
             }
         }
     });
     if let Some(e) = r.effects.iter().find(|e| harmonics_of_a_table(e).is_some()) {
         h.push_str("<details><summary>Coefficients of the angle table</summary>");
         table(h, "Coefficients of the angle table", &["parameter", "value", "95 % interval", "unit"], |h| {
-            e.parameters.iter().for_each(|p| parameter(h, e, p));
+            e.parameters.iter().for_each(|p| parameter(h, e, p, SEARCHED));
         });
         h.push_str("</details>");
     }
 }
 
+/// In the place of an interval.
+const SEARCHED: &str = "set by a search";
 /// The effect whose parameters are a series, two for each harmonic, and many.
 const ANGLE_TABLE: &str = "angle-table";
 
@@ -172,20 +174,18 @@ fn harmonics_of_a_table(e: &EffectReport) -> Option<(usize, (usize, f64))> {
     Some((e.parameters.len() / 2, largest))
 }
 
-fn parameter(h: &mut String, e: &EffectReport, p: &ParameterReport) {
-    let name = format!("{}: {}", escape(&e.id), escape(&p.name));
-    let (value, ends) = match p.ci95.map(|c| interval(p.value, c)) {
-        Some([value, low, high]) => (value, format!("{low} … {high}")),
-        None => (significant(p.value), "set by a search".to_owned()),
-    };
-    row(h, &[&name, &value, &ends, &escape(&p.unit)]);
-    if e.id == EffectId::DetectionSkew.description().id {
-        let degrees = |v: f64| v.atan().to_degrees();
-        let (value, ends) = match p.ci95.map(|c| interval(degrees(p.value), c.map(degrees))) {
+/// A parameter of an effect; `without` stands where it has no interval. A skew is told as an angle besides.
+pub(super) fn parameter(h: &mut String, e: &EffectReport, p: &ParameterReport, without: &str) {
+    let mut told = |name: &str, of: fn(f64) -> f64, unit: &str| {
+        let (value, ends) = match p.ci95.map(|c| interval(of(p.value), c.map(of))) {
             Some([value, low, high]) => (value, format!("{low} … {high}")),
-            None => (significant(degrees(p.value)), String::new()),
+            None => (significant(of(p.value)), without.to_owned()),
         };
-        row(h, &[&format!("{}: axes off a right angle by", escape(&e.id)), &value, &ends, "deg"]);
+        row(h, &[&format!("{}: {}", escape(&e.id), escape(name)), &value, &ends, &escape(unit)]);
+    };
+    told(&p.name, |v| v, &p.unit);
+    if e.id == EffectId::DetectionSkew.description().id {
+        told("axes off a right angle by", |v| v.atan().to_degrees(), "deg");
     }
 }
 
