@@ -2,7 +2,7 @@
 //!
 //! A mapping of terms only: no clause of the standard is quoted, and none is claimed to be fulfilled.
 
-use cvg_calibration::report::Report;
+use cvg_calibration::report::{Report, RunReport};
 
 /// One term and its value.
 pub(crate) struct Entry {
@@ -62,8 +62,35 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
             out.push(entry("run-down time constant", "decay time constant of the amplitude, τ", value));
         }
     }
+    let ppm = |k: &RunReport| Some(1e6 * k.angular_gain?.value / r.angular_gain.value);
+    let repeated = |of: &dyn Fn(&RunReport) -> Option<f64>, unit: &str| {
+        let sound = r.runs.iter().filter(|run| run.agrees != Some(false));
+        let told: Vec<f64> = sound.filter_map(of).filter(|v| v.is_finite()).collect();
+        spread(&told).map(|s| format!("{s:.1} {unit} over {} runs", told.len()))
+    };
+    if let Some(value) = repeated(&ppm, "ppm") {
+        out.push(entry(
+            "scale factor, repeatability",
+            "standard deviation of what each run says of k by itself",
+            value,
+        ));
+    }
+    if let Some(value) = repeated(&|run| Some(3600.0 * run.bias_dps?.value), "deg/h") {
+        out.push(entry("bias, repeatability", "standard deviation of what each run says of its bias by itself", value));
+    }
     out.push(entry("output noise", "white part of the angle error, rms", format!("{:.6}°", r.heldout.noise_floor_deg)));
     out
+}
+
+/// Runs below which a spread is none.
+const FEWEST_RUNS: usize = 3;
+
+/// Standard deviation of what several runs say.
+fn spread(values: &[f64]) -> Option<f64> {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    (values.len() >= FEWEST_RUNS).then(|| (square / (n - 1.0)).sqrt())
 }
 
 /// The first parameter of an effect that was found.
