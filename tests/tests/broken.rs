@@ -150,6 +150,16 @@ fn is_right(outcome: Result<Identification, Refusal>, warning: &[&str]) -> Ident
     identified
 }
 
+/// The interval of the angular gain holds it, and one of the warnings has all of these in it.
+fn is_covered(outcome: Result<Identification, Refusal>, warning: &[&str]) -> Identification {
+    let identified = outcome.unwrap_or_else(|e| panic!("{e}"));
+    let r = &identified.report;
+    let [low, high] = r.angular_gain.ci95;
+    assert!(low <= ANGULAR_GAIN && ANGULAR_GAIN <= high && high - low < 0.02, "{:?}", r.angular_gain);
+    assert!(r.warnings.iter().any(|w| warning.iter().all(|part| w.contains(part))), "{warning:?}: {:#?}", r.warnings);
+    identified
+}
+
 /// Puts one value in the place of those of some rows.
 fn hold(recording: &mut Recording, rows: std::ops::Range<usize>) {
     for v in [&mut recording.xc_v, &mut recording.yc_v].into_iter().flatten() {
@@ -394,6 +404,35 @@ fn a_drift_that_is_not_believed_widens_the_interval_of_the_angular_gain() {
     assert!(low < ANGULAR_GAIN + 1e-5 && 0.782 < high + 1e-5, "{:?}", report.angular_gain);
     let is_said = |w: &String| w.contains("do not agree on the angular gain") && w.contains("89dps-2.csv 0.78");
     assert!(report.warnings.iter().any(is_said), "{:?}", report.warnings);
+}
+
+/// The drift of the run that turns one way takes up what the other's rate is wrong by.
+#[test]
+fn where_one_run_turns_back_and_no_other_bears_it_out_the_interval_covers_what_the_others_tell() {
+    let back = Made { rate_dps: 60.0, duration_s: 40.0, swings: 1.0, ..Made::default() };
+    let mut wrong = back.recording();
+    wrong.rate_dps.iter_mut().flatten().for_each(|rate| *rate *= 1.0005);
+    let steady = Made { rate_dps: 60.0, duration_s: 40.0, seed: 2, ..Made::default() };
+    is_covered(identified(vec![wrong, steady.recording()]), &["one run that turns back", "60dps-2.csv"]);
+    // another that turns back bears it out, and nothing is widened
+    let other = Made { rate_dps: 90.0, seed: 3, ..back.clone() };
+    let identified = identified(vec![back.recording(), steady.recording(), other.recording()]).unwrap();
+    assert!(identified.report.warnings.iter().all(|w| !w.contains("turns back")), "{:?}", identified.report.warnings);
+}
+
+#[test]
+fn references_that_differ_by_a_little_are_said_to_and_the_interval_covers_both() {
+    let apart = |by: f64, seed| {
+        let made = Made { reference: Told::Both, seed, ..Made::default() };
+        let mut recording = made.recording();
+        let turned = made.turned(&made.rates());
+        recording.table_deg = Some(turned.iter().map(|d| ((1.0 + by) * d).rem_euclid(360.0)).collect());
+        recording
+    };
+    is_covered(identified(vec![apart(-9e-3, 1)]), &["500dps-1.csv", "turns by -0.90 % more", "covers both"]);
+    // what a command differs by from what the table does is nothing to speak of
+    let report = identified(vec![apart(5e-4, 1)]).unwrap().report;
+    assert!(report.warnings.iter().all(|w| !w.contains("covers both")), "{:?}", report.warnings);
 }
 
 #[test]

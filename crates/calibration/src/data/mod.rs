@@ -6,6 +6,7 @@ pub(crate) mod agreement;
 pub(crate) mod copies;
 pub(crate) mod plausibility;
 pub(crate) mod rail;
+pub(crate) mod references;
 pub(crate) mod sampling;
 pub(crate) mod slips;
 pub(crate) mod table;

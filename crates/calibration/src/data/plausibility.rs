@@ -1,5 +1,4 @@
-//! Rows and columns that cannot be what they say: values that stood still while the table turned, a table angle and a rate
-//! that contradict each other.
+//! Rows and columns that cannot be what they say: values that stood still while the table turned.
 //!
 //! A value is *held* where it stays the same to the last bit while the input turns, and then makes up for it in one jump.
 //! A coarse converter stays the same as well, but jumps by its own step only; a table at rest does so with the input.
@@ -8,6 +7,7 @@ use std::ops::Range;
 
 use crate::data::copies;
 use crate::data::rail::rows_at_rails;
+use crate::data::references::references;
 use crate::estimation::statistics::median;
 use crate::recording::{Channel, Recording};
 
@@ -25,12 +25,6 @@ const THROUGHOUT: f64 = 0.8;
 const FEWEST_AGES: usize = 16;
 /// A value that is clipped stands still for more than this many times as long as a step of its converter makes it.
 const CLIPPED: f64 = 2.0;
-/// A table and a rate agree within this share.
-const AGREE: f64 = 0.02;
-/// So many steps of both tell whether they do.
-const FEWEST_STEPS: usize = 16;
-/// A factor between them is a unit's within this share.
-const A_UNIT: f64 = 0.02;
 
 /// What was found wrong with a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -39,6 +33,8 @@ pub(crate) struct Findings {
     pub(crate) warnings: Vec<String>,
     /// why the recording serves for nothing
     pub(crate) broken: Option<Broken>,
+    /// by which share table and rate differ, where they do
+    pub(crate) references_apart: f64,
 }
 
 /// Why a recording serves for nothing.
@@ -57,9 +53,12 @@ const FEWEST_COMMANDS: usize = 50;
 pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let mut findings = Findings::default();
     let name = recording.source.display().to_string();
-    if let Some(broken) = references(recording, &name, &mut findings.warnings) {
-        findings.broken = Some(broken);
-        return findings;
+    match references(recording, &name, &mut findings.warnings) {
+        Ok(apart) => findings.references_apart = apart,
+        Err(broken) => {
+            findings.broken = Some(broken);
+            return findings;
+        }
     }
     let at_rails = rows_at_rails(recording);
     let clipped = at_rails.iter().filter(|at| **at).count();
@@ -319,96 +318,6 @@ pub(super) fn leave_out(recording: &mut Recording, rows: &[bool]) {
     recording.unknown.clear();
 }
 
-/// Whether the table's angle and the rate tell of the same rotation, where both were recorded. The angle is what counts: a
-/// rate in another unit, or with another sign, is said and passed over.
-fn references(recording: &Recording, name: &str, warnings: &mut Vec<String>) -> Option<Broken> {
-    let (table, rate, t) = (recording.table_deg.as_deref()?, recording.rate_dps.as_deref()?, &recording.t_s);
-    // steps of both where the table is not at rest: by the rate, and as much of it as is known of the table's, degrees
-    let fastest = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
-    let steps: Vec<[f64; 2]> = (1..t.len())
-        .filter(|&i| rate[i - 1].abs().min(rate[i].abs()) > 0.1 * fastest && rate[i - 1] * rate[i] > 0.0)
-        .map(|i| [0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]), within_a_turn(table[i] - table[i - 1])])
-        .filter(|[by_rate, _]| by_rate.is_finite() && *by_rate != 0.0)
-        .collect();
-    let close = steps.iter().filter(|step| step.iter().all(|d| d.abs() < 90.0));
-    let mut factors: Vec<f64> = close.map(|[by_rate, by_table]| by_table / by_rate).collect();
-    if factors.len() < FEWEST_STEPS {
-        return beyond_half_a_turn(&steps, name, warnings);
-    }
-    let factor = median(&mut factors);
-    let mut off: Vec<f64> = factors.iter().map(|f| (f - factor).abs()).collect();
-    // how sure the median is of itself: noise of a fast recording is larger than its steps
-    let unsure = 3.0 * median(&mut off) / (factors.len() as f64).sqrt();
-    let is = |wanted: f64| (factor / wanted - 1.0).abs() <= A_UNIT + unsure;
-    if (factor - 1.0).abs() <= AGREE + unsure {
-        return None;
-    }
-    let unit = [
-        (57.295_78, "rad/s"),
-        (6.0, "revolutions per minute"),
-        (360.0, "revolutions per second"),
-        (1e-3, "mdeg/s"),
-        (1.0 / 3600.0, "deg/h"),
-    ];
-    for (size, what) in unit {
-        for sign in [1.0, -1.0] {
-            if is(sign * size) {
-                let also = if sign < 0.0 { " and counts the other way" } else { "" };
-                warnings.push(format!(
-                    "{name}: rate_dps is {factor:.4} of what table_deg says, as if in {what}{also}; table_deg is used"
-                ));
-                return None;
-            }
-        }
-    }
-    if is(-1.0) {
-        warnings.push(the_other_way(name));
-        return None;
-    }
-    Some(contradiction(format!("table_deg turns {factor:.4} times as fast as rate_dps says")))
-}
-
-/// The same where the table turns by up to a turn and more from row to row, so that its angle tells its steps but for whole
-/// turns: they are those of the rate, those of its opposite, or neither.
-fn beyond_half_a_turn(steps: &[[f64; 2]], name: &str, warnings: &mut Vec<String>) -> Option<Broken> {
-    if steps.len() < FEWEST_STEPS {
-        return None;
-    }
-    let off = |sign: f64| {
-        let mut off: Vec<f64> = steps.iter().map(|[r, t]| within_a_turn(t - sign * r)).collect();
-        let middle = median(&mut off);
-        let mut scatter: Vec<f64> = off.iter().map(|d| (d - middle).abs()).collect();
-        let mut size: Vec<f64> = steps.iter().map(|[r, _]| r.abs()).collect();
-        let unsure = 3.0 * median(&mut scatter) / (steps.len() as f64).sqrt();
-        (middle, AGREE * median(&mut size) + unsure)
-    };
-    let (ahead, allowed) = off(1.0);
-    if ahead.abs() <= allowed {
-        return None;
-    }
-    let (behind, allowed) = off(-1.0);
-    if behind.abs() <= allowed {
-        warnings.push(the_other_way(name));
-        return None;
-    }
-    Some(contradiction(format!(
-        "from row to row table_deg turns {ahead:.2}° further than rate_dps says, or whole turns more"
-    )))
-}
-
-fn the_other_way(name: &str) -> String {
-    format!("{name}: rate_dps counts the other way than table_deg, which is used")
-}
-
-fn contradiction(problem: String) -> Broken {
-    Broken { problem, wanted: "references that agree, or only the one that is right (the other column renamed)".into() }
-}
-
-/// An angle in degrees without its whole turns, −180 to 180.
-fn within_a_turn(deg: f64) -> f64 {
-    deg - 360.0 * (deg / 360.0).round()
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -556,36 +465,5 @@ pub(super) mod tests {
         let said = format!("{above} rows stand at the rail");
         assert!(findings.broken.is_none() && findings.warnings[0].contains(&said), "{said}: {findings:?}");
         assert!(recording.len() == 2000 - above && recording.xc_v.iter().flatten().all(|v| *v < top));
-    }
-
-    #[test]
-    fn references_of_a_slow_recording_are_compared_but_for_whole_turns() {
-        let every_half_second = |factor: f64| {
-            let t_s: Vec<f64> = (0..400).map(|i| 0.5 * f64::from(i)).collect();
-            let table = t_s.iter().map(|t| (250.0 * t * factor).rem_euclid(360.0)).collect();
-            Recording { rate_dps: Some(vec![250.0; 400]), table_deg: Some(table), t_s, ..recorded() }
-        };
-        let of = |factor: f64| references(&every_half_second(factor), "slow.csv", &mut Vec::new());
-        assert_eq!((of(1.0), of(-1.0), of(1.01)), (None, None, None));
-        for factor in [0.7, 1.04, 1.229, 1.5] {
-            assert!(of(factor).is_some_and(|b| b.problem.contains("from row to row")), "{factor}");
-        }
-    }
-
-    #[test]
-    fn references_that_disagree_serve_for_nothing_and_a_unit_is_named() {
-        let with_table = |factor: f64| {
-            let mut recording = recorded();
-            let table = recording.t_s.iter().map(|t| (500.0 * t * factor).rem_euclid(360.0));
-            recording.table_deg = Some(table.collect());
-            recording
-        };
-        assert_eq!(mend(&mut with_table(1.0)), Findings::default());
-        let broken = mend(&mut with_table(0.5)).broken;
-        assert!(broken.is_some_and(|b| b.problem.contains("0.5000 times")));
-        let mut radians = with_table(1.0);
-        radians.rate_dps = Some(vec![500f64.to_radians(); 2000]);
-        let findings = mend(&mut radians);
-        assert!(findings.broken.is_none() && findings.warnings[0].contains("rad/s"), "{findings:?}");
     }
 }

@@ -42,6 +42,8 @@ pub(crate) struct Screen {
     /// numbers of those that are not
     pub(crate) left_out: Vec<usize>,
     rotations: usize,
+    /// by which share the references of every run differ, that of the run where they differ least
+    pub(crate) references_apart: f64,
 }
 
 /// The angular gain that a campaign states, if it is one.
@@ -129,15 +131,19 @@ impl Screen {
     /// Where too few are left.
     pub(crate) fn mended(&mut self, runs: Vec<Run>, warnings: &mut Vec<String>) -> Result<Vec<Run>, Refusal> {
         let mut broken = Vec::new();
-        let mut sound = Vec::new();
+        let (mut sound, mut apart) = (Vec::new(), f64::INFINITY);
         for (number, mut run) in runs.into_iter().enumerate() {
             let findings = mend(&mut run.recording);
             warnings.extend(findings.warnings);
             match findings.broken {
                 Some(what) => broken.push((number, run_name(&run), what)),
-                None => sound.push(run),
+                None => {
+                    sound.push(run);
+                    apart = apart.min(findings.references_apart);
+                }
             }
         }
+        self.references_apart = if sound.is_empty() { 0.0 } else { apart };
         require_one_unit(&sound)?;
         let fitted = sound.iter().filter(|r| r.role == Role::Fit).count();
         let too_many = fitted == 0 || broken.len() as f64 > MOST_BROKEN * self.rotations as f64;

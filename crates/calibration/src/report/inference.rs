@@ -57,13 +57,22 @@ pub(crate) fn covering<'a>(
     let odd: Vec<(&str, f64)> =
         runs.filter_map(|(run, own)| own.filter(|[v, d]| contradicts(*v, *d)).map(|[v, _]| (run, v))).collect();
     let Some(farthest) = odd.iter().map(|(_, own)| off(*own)).max_by(f64::total_cmp) else { return all };
-    let said: Vec<String> = odd.iter().take(4).map(|(run, own)| format!("{run} {own:.5}")).collect();
     warnings.push(format!(
         "the runs do not agree on the {what}, {:.5} of all of them: {}; its interval covers them",
         all.value,
-        said.join(", ")
+        listed(&odd)
     ));
     all.widened(farthest - half)
+}
+
+/// The first of runs with what each tells, for a message.
+fn listed(runs: &[(&str, f64)]) -> String {
+    runs.iter().take(4).map(|(run, own)| format!("{run} {own:.5}")).collect::<Vec<_>>().join(", ")
+}
+
+/// An estimate with an interval that reaches to what single runs tell.
+fn reaching(all: Estimate, runs: &[(&str, f64)]) -> Estimate {
+    runs.iter().fold(all, |e, (_, own)| Estimate { ci95: [e.ci95[0].min(*own), e.ci95[1].max(*own)], ..e })
 }
 
 impl Inference<'_> {
@@ -85,7 +94,7 @@ impl Inference<'_> {
 
     /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
     /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for. So
-    /// is what single runs contradict it with.
+    /// is what single runs contradict it with, and by how much the references of every run differ.
     pub(crate) fn angular_gain(&self, warnings: &mut Vec<String>) -> Estimate {
         let estimate = self.estimate(Unknown::AngularGain);
         let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
@@ -95,8 +104,33 @@ impl Inference<'_> {
             .filter(|m| m.id.description().stage == Stage::Mechanics)
             .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
             .sum();
-        let estimate = estimate.widened(slowed * estimate.value.abs());
-        covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings)
+        let open = slowed + self.dataset.screen.references_apart;
+        let estimate = estimate.widened(open * estimate.value.abs());
+        let estimate = covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings);
+        self.turned_back_once(estimate, warnings)
+    }
+
+    /// The angular gain with an interval that also covers what the runs that turn one way would tell of it if they did not
+    /// drift, where a single run turns back and tells the gain from their drifts: were its rate another, the drifts would take
+    /// that up, and nothing would contradict.
+    fn turned_back_once(&self, gain: Estimate, warnings: &mut Vec<String>) -> Estimate {
+        let fitted = self.dataset.tracks.iter().filter(|p| p.drifts && p.track.samples(Role::Fit) > 0);
+        if fitted.filter(|p| p.track.one_way_rate().is_none()).count() != 1 {
+            return gain;
+        }
+        let without_drift = self.own_angular_gains().filter_map(|(run, own)| Some((run, own?[0])));
+        let odd: Vec<(&str, f64)> =
+            without_drift.filter(|(_, own)| (own - gain.value).abs() > gain.half_width()).collect();
+        if odd.is_empty() {
+            return gain;
+        }
+        warnings.push(format!(
+            "the angular gain, {:.5}, is told from drifts by one run that turns back, and no other bears it out: without a drift \
+             the others give {}, and its interval covers them; a second run there and back would tell",
+            gain.value,
+            listed(&odd)
+        ));
+        reaching(gain, &odd)
     }
 
     /// The angular gain that each track tells where it turns one way and drifted by nothing, and how far off that is by as
@@ -145,15 +179,14 @@ impl Inference<'_> {
         if odd.is_empty() {
             return ratio;
         }
-        let said: Vec<String> = odd.iter().take(4).map(|(run, own)| format!("{run} {own:.5}")).collect();
         warnings.push(format!(
             "the detection gain ratio, {:.5}, and anisodamping are told apart by a run that no other bears out: without \
              anisodamping the runs differ in the ratio, {}, and its interval covers them; a rotation run at yet another rate \
              would tell",
             ratio.value,
-            said.join(", ")
+            listed(&odd)
         ));
-        odd.iter().fold(ratio, |e, (_, own)| Estimate { ci95: [e.ci95[0].min(*own), e.ci95[1].max(*own)], ..e })
+        reaching(ratio, &odd)
     }
 
     /// G_Ax/G_Ay, where the campaign identifies it.
