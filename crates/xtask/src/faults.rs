@@ -79,8 +79,10 @@ enum Ending {
 pub(crate) struct Request<'a> {
     /// those whose name or file contains one of these; all where there is none
     pub(crate) only: Vec<&'a str>,
-    /// every so many of them, from the first; all where it is 0
+    /// every so many of them; all where it is 0
     pub(crate) every: usize,
+    /// the first of them, counted from 0: what `every` leaves out is planted from elsewhere
+    pub(crate) from: usize,
     /// as many as are begun in this time: those in files that the last commit changed, then those that it draws
     pub(crate) most_s: Option<u64>,
 }
@@ -92,10 +94,7 @@ const FEWEST: usize = 4;
 pub(crate) fn run(request: &Request<'_>) -> crate::Outcome {
     let started = Instant::now();
     let all = library();
-    let only = |f: &&Fault| {
-        request.only.is_empty() || request.only.iter().any(|text| f.name.contains(text) || f.file.contains(text))
-    };
-    let mut chosen: Vec<Fault> = all.iter().filter(only).step_by(request.every.max(1)).copied().collect();
+    let mut chosen = chosen(&all, request);
     if request.most_s.is_some() {
         let commit = git(&["rev-parse", "HEAD"])?;
         let changed = git(&["diff", "--name-only", "HEAD^"]).or_else(|_| git(&["ls-files"]))?;
@@ -136,6 +135,14 @@ pub(crate) fn run(request: &Request<'_>) -> crate::Outcome {
         println!("missed: {name}");
     }
     Ok(missed.is_empty())
+}
+
+/// The faults that are asked for, in the order of the library.
+fn chosen(all: &[Fault], request: &Request<'_>) -> Vec<Fault> {
+    let only = |f: &&Fault| {
+        request.only.is_empty() || request.only.iter().any(|text| f.name.contains(text) || f.file.contains(text))
+    };
+    all.iter().filter(only).skip(request.from).step_by(request.every.max(1)).copied().collect()
 }
 
 /// What git says.
@@ -272,6 +279,20 @@ mod tests {
         let page = fs::read_to_string(crate::repository().join("docs/src/audit.md")).expect("the page");
         let said = format!("{} faults, each of them caught when it was planted", names.len());
         assert!(page.contains(&said), "{said}");
+    }
+
+    #[test]
+    fn every_so_many_from_each_of_the_first_are_all_of_them_once() {
+        let all = library();
+        let part = |from| chosen(&all, &Request { every: 3, from, ..Request::default() });
+        let names = |faults: &[Fault]| faults.iter().map(|f| f.name).collect::<BTreeSet<_>>();
+        let parts: Vec<_> = (0..3).map(part).collect();
+        assert_eq!(parts.iter().map(Vec::len).sum::<usize>(), all.len());
+        assert_eq!(names(&parts.concat()), names(&all));
+        assert_eq!(names(&chosen(&all, &Request::default())), names(&all));
+        // counted among those that are asked for, not among all
+        let of_pi = |from| chosen(&all, &Request { only: vec!["controller/src/pi.rs"], from, ..Request::default() });
+        assert_eq!(names(&of_pi(1)), names(&of_pi(0)[1..]));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```sh
 //! cargo xtask prove [--only TEXT]   # the bit-precise harnesses, by CBMC on the compiled code
 //! cargo xtask audit                 # every equation, every requirement, and what this run says of it
-//! cargo xtask faults [--only TEXT]... [--every N] [--seconds N]   # faults that an engineer makes, planted; tests have to catch each
+//! cargo xtask faults [--only TEXT]... [--every N [--from K]] [--seconds N]   # faults that an engineer makes, planted; tests have to catch each
 //! ```
 #![forbid(unsafe_code)]
 
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER] | \
-     cargo xtask faults [--only TEXT]... [--every N] [--seconds N]";
+     cargo xtask faults [--only TEXT]... [--every N [--from K]] [--seconds N]";
 
 /// What a task returns: whether everything held, or why it could not be found out.
 type Outcome = Result<bool, String>;
@@ -48,6 +48,7 @@ fn planted(options: &[&str]) -> Outcome {
         match *pair {
             ["--only", text] => request.only.push(text),
             ["--every", n] => request.every = n.parse().map_err(|_| USAGE.to_owned())?,
+            ["--from", k] => request.from = k.parse().map_err(|_| USAGE.to_owned())?,
             ["--seconds", n] => request.most_s = Some(n.parse().map_err(|_| USAGE.to_owned())?),
             _ => return Err(USAGE.to_owned()),
         }
@@ -58,6 +59,10 @@ fn planted(options: &[&str]) -> Outcome {
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    if arguments.iter().any(|a| matches!(*a, "--help" | "-h" | "help")) {
+        println!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
     let outcome = match arguments[..] {
         ["prove"] => prove::run(None),
         ["prove", "--only", text] => prove::run(Some(text)),
