@@ -77,4 +77,16 @@ mod tests {
             assert_eq!((count.unseen, count.lost), (0, true), "until it is acknowledged");
         }
     }
+
+    #[test]
+    fn nothing_is_lost_of_a_count_in_the_window_in_which_it_begins() {
+        // a pattern may jump while it is spun up: what was counted until then is nobody's angle
+        for begins in [Sight { movement: Movement::Jumped, ..SEEN }, Sight { interrupted: true, ..SEEN }] {
+            let mut count = Continuity::default();
+            count.see(begins, 4, || false);
+            assert_eq!((count.counting, count.lost), (true, false), "{begins:?}");
+            count.see(begins, 4, || true);
+            assert!(count.lost, "{begins:?}");
+        }
+    }
 }

@@ -67,3 +67,26 @@ fn the_rates_of_the_variables_are_their_differences() {
         assert_eq!(parts(z.pendulum_rate(&d))[..], difference[..], "{d:?}");
     }
 }
+
+/// An ellipse that is turned as it is precesses at that rate, however round it is.
+#[test]
+fn an_ellipse_precesses_as_fast_as_it_is_turned() {
+    for q in [0.0, 0.3, -0.8] {
+        for theta in (-8..=8).map(|k| 0.19 * f64::from(k)) {
+            let e = Orbit { a: 1.0, q, theta, delta: 0.4 }.envelope();
+            let turning = Envelope::new(-e.y_c, -e.y_s, e.x_c, e.x_s) * 0.7;
+            assert_abs_diff_eq!(e.precession(&turning), 0.7, epsilon = 1e-14);
+        }
+    }
+}
+
+/// A line is as thin in single precision as in double: what is left of the energy beside the line has no digits there.
+#[test]
+fn a_thin_orbit_is_thin_in_single_precision_too() {
+    for q in [1e-3_f32, -1e-4, 1e-5] {
+        for theta in (-8..=8).map(|k| 0.19 * k as f32) {
+            let found = Orbit { a: 1.0, q, theta, delta: 0.4 }.envelope().orbit();
+            assert_abs_diff_eq!(found.q, q, epsilon = 4.0 * f32::EPSILON);
+        }
+    }
+}

@@ -10,6 +10,7 @@ mod demodulation;
 mod edges;
 mod estimator;
 mod instrument;
+mod meaning;
 mod model;
 mod regression;
 mod single;
@@ -63,6 +64,7 @@ fn library() -> Vec<Fault> {
         unseen::FAULTS,
         &upkeep::faults(),
         single::FAULTS,
+        meaning::FAULTS,
     ]
     .concat()
 }

@@ -54,6 +54,20 @@ fn too_long_without_a_window_is_doubted<T: Float>() {
     assert!(bench.status.half_turns_lost);
 }
 
+fn an_acknowledgement_shows_no_window<T: Float>() {
+    // 40 windows that nobody saw are few enough, and so are 10; together they are not
+    for acknowledges in [true, false] {
+        let mut bench = Bench::<T>::running(0.2, 1.0);
+        bench.windows_through(40, |_| [f64::NAN; 2]);
+        assert!(!bench.state.continuity.lost);
+        if acknowledges {
+            bench.state.acknowledge_half_turns();
+        }
+        bench.windows_through(10, |_| [f64::NAN; 2]);
+        assert!(bench.state.continuity.lost, "acknowledged in between: {acknowledges}");
+    }
+}
+
 fn a_jump_and_a_fault_are_doubted<T: Float>() {
     let mut bench = Bench::<T>::running(0.2, 0.0);
     bench.theta_rad += 0.5;
@@ -107,6 +121,7 @@ in_both_precisions! {
     turns_that_nobody_saw_are_doubted_until_it_is_acknowledged unseen_turns_are_doubted;
     a_phase_that_is_not_where_it_was_left_is_doubted a_phase_that_jumps_is_doubted;
     as_many_windows_as_a_pattern_needs_for_45_degrees_are_doubted too_long_without_a_window_is_doubted;
+    windows_that_nobody_saw_are_as_many_after_an_acknowledgement an_acknowledgement_shows_no_window;
     a_pattern_that_jumps_and_one_that_falls_silent_are_doubted a_jump_and_a_fault_are_doubted;
     a_start_and_another_wish_lose_nothing a_start_is_no_loss;
     what_is_acknowledged_without_a_direction_is_not_lost_with_the_first at_rest_there_is_nothing_to_lose;
