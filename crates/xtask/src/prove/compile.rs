@@ -63,7 +63,7 @@ fn module(repository: &Path, root: &Root, work: &Path, package: &str, members: &
         format!("-Ldependency={}", shim.display()),
         format!("-Clinker={}", root.tool("wasm-ld").display()),
         format!("-Clink-arg=-zstack-size={STACK}"),
-        // bulk copies and saturating conversions as plain code
+        // saturating conversions as plain code; bulk copies stay, see `known_lengths`
         "-Ctarget-cpu=mvp".to_owned(),
     ];
     let target = work.join("wasm");
@@ -81,6 +81,7 @@ fn module(repository: &Path, root: &Root, work: &Path, package: &str, members: &
         .arg(c.join("harness.c"))
         .arg(target.join("wasm32-unknown-unknown/release/harness.wasm")))?;
     let module = fs::read_to_string(c.join("harness.c")).map_err(io)?;
+    known_lengths(&module).map_err(|reason| format!("{package}: {reason}"))?;
     fs::write(c.join("data.c"), data(&module)?).map_err(io)?;
     fs::write(c.join("host.c"), include_str!("host.c")).map_err(io)?;
     Ok(c)
@@ -154,6 +155,36 @@ fn data(module: &str) -> Result<String, String> {
     Ok(format!("#define MEMORY {memory}\nstatic uint8_t memory[MEMORY] = {{{initial}}};\n"))
 }
 
+/// Refuses bulk copies and fills of a length that is not a number in the module.
+///
+/// wasm2c makes `memmove` and `memset` of them, of which CBMC has models of its own. The guards ask whether these are whole where
+/// the length is a number; of one that may be anything they leave it to arrays whose size may be anything, which nothing here
+/// vouches for.
+fn known_lengths(module: &str) -> Result<(), String> {
+    let mut before = "";
+    let mut function = "";
+    for line in module.lines() {
+        if !line.starts_with([' ', '\t', '}', '#']) && line.ends_with('{') {
+            function = line;
+        }
+        let line = line.trim();
+        let bulk = ["memory_copy(&", "memory_fill(&"].into_iter().any(|call| line.starts_with(call));
+        if bulk {
+            // the operand is pushed by the line before it is used
+            let length = line.trim_end_matches(");").rsplit(", ").next().unwrap_or_default();
+            let known = before.split_once(" = ").is_some_and(|(name, value)| {
+                let digits = value.strip_suffix("u;").unwrap_or_default();
+                name == length && !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+            });
+            if !known {
+                return Err(format!("a copy of a length that is not known: {line} in {function}"));
+            }
+        }
+        before = line;
+    }
+    Ok(())
+}
+
 fn run(command: &mut Command) -> Result<(), String> {
     let shown = format!("{:?}", command.get_program());
     let output = command.output().map_err(|e| format!("{shown}: {e}"))?;
@@ -166,7 +197,7 @@ fn run(command: &mut Command) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use super::data;
+    use super::{data, known_lengths};
 
     const MODULE: &str = "static const u8 segment_a[] = {\n  0x01, 0x02, \n  0x03, \n};\n\
         static void init() {\n  LOAD_DATA(instance->w2c_memory, 4096u, segment_a, 3);\n}\n";
@@ -182,5 +213,35 @@ mod tests {
         data(&MODULE.replace("segment_a[]", "segment_b[]")).expect_err("not there");
         data(&MODULE.replace("0x02, ", "")).expect_err("not whole");
         data(&MODULE.replace("LOAD_DATA(instance->w2c_memory, ", "LOAD_DATA(")).expect_err("not known");
+    }
+
+    /// What wasm2c makes of `to[..n].copy_from_slice(&from[..n])`, with `n` as it is given.
+    fn copying(length: &str) -> String {
+        format!(
+            "static inline void memory_copy(wasm_rt_memory_t* dest,\n}}\nvoid w2c_harness_x(w2c_harness* instance) {{\n  \
+             var_i1 += var_i2;\n  var_i2 = {length};\n  \
+             memory_copy(&instance->w2c_memory, &instance->w2c_memory, var_i0, var_i1, var_i2);\n}}\n"
+        )
+    }
+
+    #[test]
+    fn a_copy_of_a_length_that_is_a_number_is_taken() {
+        known_lengths(&copying("128u")).expect("a number");
+        known_lengths(&copying("128u").replace("memory_copy(&", "memory_fill(&")).expect("a number");
+        known_lengths(MODULE).expect("no copy");
+    }
+
+    #[test]
+    fn a_copy_of_any_length_is_refused() {
+        for length in ["var_l2", "var_l2 + 1u", "", "u", "-1u"] {
+            let said = known_lengths(&copying(length)).expect_err(length);
+            assert!(said.contains("memory_copy") && said.contains("w2c_harness_x"), "{said}");
+            known_lengths(&copying(length).replace("memory_copy(&", "memory_fill(&")).expect_err(length);
+        }
+        // a number of something else
+        known_lengths(&copying("128u").replace("var_i2 = ", "var_i3 = ")).expect_err("the length is not the number");
+        // the length is what was computed before
+        known_lengths(&copying("128u").replace("  memory_copy(&", "  var_i0 += var_i1;\n  memory_copy(&"))
+            .expect_err("far");
     }
 }
