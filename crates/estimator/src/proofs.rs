@@ -11,9 +11,14 @@ pub mod direction;
 pub mod oscillator;
 pub mod precession;
 pub mod short_way;
+#[cfg(test)]
+mod tests;
 
 use cvg_model::{Envelope, Float, Pendulum};
 use kani::Arbitrary;
+
+/// The components of a direction as [`direction`] promises them and [`precession`] assumes them.
+const LONGEST_DIRECTION: i32 = 3;
 
 fn any_envelope<T: Float + Arbitrary>() -> Envelope<T> {
     Envelope::new(kani::any(), kani::any(), kani::any(), kani::any())

@@ -3,7 +3,7 @@
 use cvg_model::Float;
 use kani::Arbitrary;
 
-use super::any_envelope;
+use super::{LONGEST_DIRECTION, any_envelope};
 use crate::Status;
 use crate::direction::major_axis_of;
 
@@ -24,7 +24,7 @@ fn direction_of_twice_the_angle_is_bounded<T: Float + Arbitrary>(longest: T) {
 /// more than the contract of the root: on √(w² + s²) ≥ w, which intervals and random tests show.
 #[kani::proof]
 pub fn proof_direction_of_twice_the_angle_is_bounded_f32() {
-    direction_of_twice_the_angle_is_bounded(3.0_f32);
+    direction_of_twice_the_angle_is_bounded(LONGEST_DIRECTION as f32);
 }
 
 /// A half is claimed.

@@ -51,14 +51,31 @@ pub fn twin_correction_is_within_its_limit_f32() {
     correction_is_within_its_limit(0.5_f32);
 }
 
+/// The longest and the shortest period between samples that the proofs are about, as powers of two: 1 ms and 1 ns.
+pub(super) const PERIODS: core::ops::RangeInclusive<i32> = -30..=-10;
+
+/// What the proofs assume of an oscillator whose period is at most `two_to` the power of two; a test holds what `new` accepts
+/// against it. Of the product of period and limit, which `new` keeps below a fifth, it is said by powers of two: a product
+/// of two unknowns would be one more for the solver.
+pub(super) fn assumed<T: Float>(o: &Oscillator<T>, two_to: i32) -> bool {
+    let power = |n: i32| T::from_f64(f64::from_bits(((1023 + i64::from(n)) as u64) << 52));
+    let positive = |v: T, most: T| v > T::zero() && v <= most;
+    PERIODS.contains(&two_to)
+        && o.centre_cos.magnitude() <= T::one()
+        && o.centre_sin.magnitude() <= T::one()
+        && positive(o.period_s, power(two_to))
+        && positive(o.limit_rad_s, power(-1 - two_to))
+}
+
 fn phasor_is_bounded<T: Float + Arbitrary>(longest: T) {
-    // precondition: sine and cosine of a phase step
-    let unit = || kani::any_where(|v: &T| v.magnitude() <= T::one());
-    // precondition: what `new` accepts, for converters of 1 kHz to 1 GHz and corrections up to a sixteenth of the rate
-    let period_s = kani::any_where(|p: &T| *p > T::zero() && *p <= T::ratio(1, 1024));
-    // precondition: the same
-    let limit_rad_s = kani::any_where(|l: &T| *l > T::zero() && *l <= T::ratio(128, 1));
-    let oscillator = Oscillator { centre_cos: unit(), centre_sin: unit(), period_s, limit_rad_s };
+    let oscillator = Oscillator {
+        centre_cos: kani::any::<T>(),
+        centre_sin: kani::any(),
+        period_s: kani::any(),
+        limit_rad_s: kani::any(),
+    };
+    // precondition: what `new` accepts, for converters of 1 kHz to 1 GHz
+    kani::assume(assumed(&oscillator, PERIODS.end() - i32::from(kani::any::<u8>() % 21)));
     let before = Phasor { cos: kani::any(), sin: kani::any(), step_cos: kani::any(), step_sin: kani::any() };
     let tuned = oscillator.tune(&before, kani::any());
     kani::cover!(tuned.cos == T::one() && tuned.sin == T::zero() && before.cos != T::one(), "anew");

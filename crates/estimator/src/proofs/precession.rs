@@ -3,22 +3,29 @@
 use cvg_model::{Float, Pendulum};
 use kani::Arbitrary;
 
-use super::any_pendulum;
+use super::{LONGEST_DIRECTION, any_pendulum};
 use crate::{Direction, Movement, Precession, PrecessionState, Status};
 
 /// Any tracker that could be built.
 pub(super) fn any_precession<T: Float + Arbitrary>() -> Precession<T> {
-    // precondition: shares of one, jumps below 45°, leads below ten windows
-    let share = |most: T| kani::any_where(|v: &T| *v >= T::zero() && *v <= most);
-    // precondition: positive times and amplitudes
-    let positive = || kani::any_where(|v: &T| *v > T::zero() && v.is_finite());
-    Precession {
-        share: share(T::one()),
-        jump_sin_2: share(T::one()),
-        half_lead: share(T::ratio(5, 1)),
-        window_s: positive(),
-        least_2: positive(),
-    }
+    let any = Precession {
+        share: kani::any(),
+        jump_sin_2: kani::any(),
+        half_lead: kani::any(),
+        window_s: kani::any(),
+        least_2: kani::any(),
+    };
+    // precondition: what `new` accepts: shares of one, jumps below 45°, leads below ten windows
+    kani::assume(assumed(&any));
+    any
+}
+
+/// What the proofs assume of a tracker; a test holds what `new` accepts against it.
+pub(super) fn assumed<T: Float>(p: &Precession<T>) -> bool {
+    let share = |v: T, most: T| v >= T::zero() && v <= most;
+    let positive = |v: T| v > T::zero() && v.is_finite();
+    let shares = share(p.share, T::one()) && share(p.jump_sin_2, T::one()) && share(p.half_lead, T::ratio(5, 1));
+    shares && positive(p.window_s) && positive(p.least_2)
 }
 
 fn half_turns_are_counted_singly<T: Float + Arbitrary>(most: i64) {
@@ -73,7 +80,7 @@ fn direction_ahead_is_bounded<T: Float + Arbitrary>(longest: T) {
         half_turns: kani::any(),
     };
     // precondition: a direction as `major_axis_of` gives it, which is proved beside
-    let bounded = || kani::any_where(|v: &T| v.magnitude() <= T::ratio(3, 1));
+    let bounded = || kani::any_where(|v: &T| v.magnitude() <= T::ratio(LONGEST_DIRECTION, 1));
     let ahead = precession.ahead(&state, &Direction { cos: bounded(), sin: bounded(), status: Status::Valid });
     let (_, within) = state.angle();
     kani::cover!(ahead.cos > T::one(), "turned ahead");
