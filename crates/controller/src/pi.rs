@@ -59,10 +59,10 @@ enum Sense {
 /// A discrete PI, K[e + (1/2τ)∫e dt], with a limit and without wind-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pi<T> {
-    gain: T,
-    integration_time_s: T,
-    period_s: T,
-    limit_v: T,
+    pub(crate) gain: T,
+    pub(crate) integration_time_s: T,
+    pub(crate) period_s: T,
+    pub(crate) limit_v: T,
     /// 2τ·limit/K: the integral that alone commands the limit
     pub(crate) integral_limit: T,
 }

@@ -10,4 +10,6 @@ pub mod pi;
 pub mod rate;
 pub mod short_way;
 pub mod supervisor;
+#[cfg(test)]
+mod tests;
 pub mod way_back;

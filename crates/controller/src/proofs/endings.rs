@@ -59,6 +59,24 @@ pub fn twin_starts_end_f32() {
     starts_end::<f32>(2);
 }
 
+//= specs/dsp.md#start-budget
+//# A start MUST end in operation or in a fault with a name within its budget of windows whatever is observed.
+/// [`Supervisor::step`], from any state and for any observation and beat, leaves a start for operation or for a fault with a
+/// name, or takes one window from what is left of its budget: within as many windows the start has ended.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_starts_end_f64() {
+    starts_end::<f64>(1);
+}
+
+/// Two windows are claimed to be taken.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_starts_end_f64() {
+    starts_end::<f64>(2);
+}
+
 /// All that is observed is well within the bounds, and it was so for at least `windows` windows.
 fn calm<T: Float>(s: &Supervisor<T>, state: &SupervisorState, o: &Observation<T>, windows: u32) -> bool {
     let p = &o.pendulum;
@@ -127,4 +145,23 @@ pub fn proof_nothing_is_walked_around_f32() {
 #[kani::should_panic]
 pub fn twin_nothing_is_walked_around_f32() {
     nothing_is_walked_around::<f32>(1);
+}
+
+//= specs/dsp.md#faults-cannot-be-walked-around
+//# A window out of bounds MUST be counted until a fault is named, rest is wished, or all was well for the time that is endured.
+/// [`Supervisor::step`], from any state and for any observation and beat, takes nothing back of the windows that were out of
+/// bounds or clipped but after the time that is endured, nor of the interruptions but after the time to forget, in which
+/// all was well; it counts each window of an amplitude too high and each departure from operation.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_nothing_is_walked_around_f64() {
+    nothing_is_walked_around::<f64>(0);
+}
+
+/// A clipped window is claimed to count twice.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_nothing_is_walked_around_f64() {
+    nothing_is_walked_around::<f64>(1);
 }

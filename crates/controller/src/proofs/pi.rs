@@ -7,15 +7,24 @@ use crate::{Command, Pi, PiState, Status};
 
 /// Any controller that can be built, and its limit.
 pub(super) fn any_controller<T: Float + Arbitrary>() -> (Pi<T>, T) {
-    let limit_v = kani::any();
-    // precondition: a configuration that `new` accepts
-    match Pi::new(kani::any(), kani::any(), kani::any(), limit_v) {
-        Ok(pi) => (pi, limit_v),
-        Err(_) => {
-            kani::assume(false);
-            unreachable!()
-        }
-    }
+    let any: Pi<T> = Pi {
+        gain: kani::any(),
+        integration_time_s: kani::any(),
+        period_s: kani::any(),
+        limit_v: kani::any(),
+        integral_limit: kani::any(),
+    };
+    // precondition: what `new` accepts
+    kani::assume(assumed(&any));
+    (any, any.limit_v)
+}
+
+/// What the proofs assume of a controller, which is more than `new` builds: of the integral's limit it is not said that it
+/// comes of the others. A test holds what `new` accepts against it.
+pub(super) fn assumed<T: Float>(pi: &Pi<T>) -> bool {
+    let positive = |v: T| v > T::zero() && v.is_finite();
+    let times = positive(pi.integration_time_s) && positive(T::two() * pi.integration_time_s) && positive(pi.period_s);
+    times && positive(pi.gain) && positive(pi.limit_v) && positive(pi.integral_limit)
 }
 
 /// One step of the energy, the quadrature or the plain controller, on any input.

@@ -100,3 +100,22 @@ pub fn proof_the_way_back_ends_f32() {
 pub fn twin_the_way_back_ends_f32() {
     the_way_back_ends::<f32>(2);
 }
+
+//= specs/dsp.md#way-back
+//# From every fault the instrument MUST be in operation within its longest rest and its shortest start once all that it observes is as it should be.
+/// [`Supervisor::step`], with any times, from any fault and from any state of a start that followed one, after a window of a
+/// line at the set energy, is one window nearer to operation: from a fault as many as are left of its rest, then those of
+/// listening, 21 of the lock and 20 of the spin-up.
+#[kani::proof]
+#[kani::solver(minisat)]
+pub fn proof_the_way_back_ends_f64() {
+    the_way_back_ends::<f64>(1);
+}
+
+/// Each window is claimed to be worth two.
+#[kani::proof]
+#[kani::solver(minisat)]
+#[kani::should_panic]
+pub fn twin_the_way_back_ends_f64() {
+    the_way_back_ends::<f64>(2);
+}
