@@ -5,6 +5,7 @@
 //! left. Nothing passes by being named.
 
 mod claims;
+mod coverage;
 mod flight;
 mod gate;
 mod page;
@@ -32,7 +33,8 @@ pub(crate) fn run(request: Request<'_>) -> crate::Outcome {
     let named = claims::read(&repository)?;
     let (proofs, left_out) = runners::proofs(&repository, request.keep_proofs)?;
     let tests = runners::tests(&repository, &named.files, request.only)?;
-    let results = Results { tests, proofs, notes: left_out };
+    let notes = [left_out, coverage::faults(&repository)?].concat();
+    let results = Results { tests, proofs, notes };
     let record = Record::assemble(&named, &results);
     let faults = gate::faults(&record, &named, &results);
 
