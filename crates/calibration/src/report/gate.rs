@@ -166,11 +166,15 @@ pub(crate) fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
     UNITS.iter().find(|(factor, _)| usual(k / factor)).map(|(_, what)| *what)
 }
 
-/// A parameter of an effect that the data brought in, with an interval wider than all that the parameter can be.
+/// A parameter of an effect that the data brought in, with an interval wider than all that the parameter can be. What is in
+/// volts goes with the amplitude, and may be in counts.
 fn undetermined(effect: &EffectReport) -> Option<String> {
     let description = EffectId::from_id(&effect.id).filter(|_| effect.origin != Origin::Declared)?.description();
     effect.parameters.iter().find_map(|found| {
         let parameter = description.parameters.iter().find(|p| p.name == found.name && p.unit == found.unit)?;
+        if parameter.unit.contains('V') {
+            return None;
+        }
         let [low, high] = found.ci95?;
         (high - low > 2.0 * (parameter.upper - parameter.lower)).then(|| {
             format!("{} of {} is {:.4} ± {:.1e} {}", found.name, effect.id, found.value, 0.5 * (high - low), found.unit)
