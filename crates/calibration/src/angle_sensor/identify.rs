@@ -7,7 +7,7 @@ use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, T_PARTS, Term};
 use super::rate_runs;
-use super::report::{Alone, Errors, Finding, Head, report};
+use super::report::{ByItself, Errors, Finding, Head, report};
 use super::samples::{SensorRun, apart, prepare, span};
 use super::screening::believed;
 use super::sensor::other_unit;
@@ -73,8 +73,7 @@ pub(crate) fn identify(
     let mut left_out = Vec::new();
     if rate_gyroscope {
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
-    }
-    if !rate_gyroscope {
+    } else {
         campaign.runs.iter().try_for_each(|run| require_degrees(run, period))?;
     }
     let mut runs = prepare(campaign, &mut left_out)?;
@@ -353,7 +352,7 @@ fn rate_finding(
         warnings,
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
-        alone: model.answered.then(|| -> Alone<'_> {
+        alone: model.answered.then(|| -> ByItself<'_> {
             let model = model.clone();
             Box::new(move |run| model.alone(run))
         }),

@@ -4,9 +4,9 @@
 //! A table that turns back from one row to the next parts from an angle that is late by a part of a row as well, or from one
 //! that was summed by another rule. That goes with the change of the rate, row by row, and is a lag's.
 
-use super::samples::{integrated, span, unwrapped};
+use super::samples::{span, unwrapped};
 use crate::data::slips::slips;
-use crate::data::table::turned;
+use crate::data::table::{integrated, turned};
 use crate::estimation::statistics::median;
 use crate::recording::Run;
 

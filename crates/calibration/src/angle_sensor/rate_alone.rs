@@ -27,24 +27,23 @@ impl RateGyroscope {
         let beside = |own: Term| {
             let every = [Term::Bias, Term::Scale, Term::Lag];
             let of_all = every.map(|term| if term == own { 0.0 } else { self.value(term) });
-            let [estimate, _] = found(&[stretch[0].without(&every, &of_all)], &[own])?;
+            let [estimate] = found(&[stretch[0].without(&every, &of_all)], &[own])?;
             Some(estimate)
         };
         Some(Alone { bias: beside(Term::Bias)?, gain: beside(Term::Scale)?.turned(self.sensor.gain) })
     }
 }
 
-/// The first two of these terms, of one alone twice the same.
-fn found(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimate; 2]> {
+/// The first of these terms.
+fn found<const N: usize>(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimate; N]> {
     let splits = splits(stretch);
     if splits.len() < 2 {
         return None;
     }
     let values = estimate(stretch, terms);
     let deviations = jackknife(&estimates(stretch, &splits, terms).0, terms.len());
-    let of = |i: usize| {
+    Some(std::array::from_fn(|i| {
         let half = T_PARTS * deviations[i];
         Estimate { value: values[i], ci95: [values[i] - half, values[i] + half] }
-    };
-    Some([of(0), of(1.min(terms.len() - 1))])
+    }))
 }

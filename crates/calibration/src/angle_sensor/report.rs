@@ -2,7 +2,7 @@
 //! found, in the form that all instruments share.
 
 use super::curve::Curve;
-use super::rate_alone::Alone as RunAlone;
+use super::rate_alone::Alone;
 use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
@@ -30,7 +30,7 @@ use crate::report::{
 pub(crate) type Errors<'a> = Box<dyn Fn(&SensorRun) -> Vec<f64> + 'a>;
 
 /// What a run of a rate gyroscope tells by itself.
-pub(crate) type Alone<'a> = Box<dyn Fn(&SensorRun) -> Option<RunAlone> + 'a>;
+pub(crate) type ByItself<'a> = Box<dyn Fn(&SensorRun) -> Option<Alone> + 'a>;
 
 /// What an identification found, with the errors that it leaves of any run.
 pub(crate) struct Finding<'a> {
@@ -52,7 +52,7 @@ pub(crate) struct Finding<'a> {
     pub(crate) declared: Errors<'a>,
     pub(crate) discovered: Errors<'a>,
     /// what each run tells by itself, of a rate gyroscope that is answered
-    pub(crate) alone: Option<Alone<'a>>,
+    pub(crate) alone: Option<ByItself<'a>>,
     /// the angle that the error is shown against
     pub(crate) direction: Errors<'a>,
     /// what is undone in the channels, where there are two

@@ -2,7 +2,7 @@
 //! Immutable once built: selection and estimation look at it through lists of rows.
 
 use super::rails::without_rails_of_their_own;
-use crate::data::table::turned;
+use crate::data::table::{integrated, turned};
 use crate::data::track::wrapped;
 use crate::error::Refusal;
 use crate::recording::{Campaign, Reference, Role, Run};
@@ -198,19 +198,6 @@ pub(crate) fn unwrapped(angles: impl Iterator<Item = f64>, period: f64) -> Vec<f
 pub(crate) fn span(values: &[f64]) -> f64 {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     if high > low { high - low } else { 0.0 }
-}
-
-/// ∫ rate dt by the trapezoidal rule, rad, from rates in deg/s.
-pub(crate) fn integrated(t_s: &[f64], rate_dps: &[f64]) -> Vec<f64> {
-    let mut angle = 0.0;
-    (0..t_s.len())
-        .map(|i| {
-            if i > 0 {
-                angle += 0.5 * (rate_dps[i] + rate_dps[i - 1]).to_radians() * (t_s[i] - t_s[i - 1]);
-            }
-            angle
-        })
-        .collect()
 }
 
 /// Derivative over uneven steps: second order inside, first order at the ends.

@@ -1,10 +1,10 @@
 //! In which unit an angle looks to be that is not in degrees: by the turn that its values fill where they wrap, and by how far
 //! it goes beside another, which a whole number of periods a turn makes one of few numbers.
 
-use super::samples::{Reading, SensorRun, span};
+use super::samples::{Reading, SensorRun, span, unwrapped};
 use super::sensor::magnitude;
 use crate::error::Refusal;
-use crate::estimation::statistics::median;
+use crate::estimation::statistics::{line, median};
 use crate::recording::Run;
 
 /// A unit of an angle and what one is in degrees.
@@ -123,10 +123,10 @@ pub(super) fn require_degrees(run: &Run, period: f64) -> Result<(), Refusal> {
     };
     let followed = |v: &Option<Vec<f64>>, at: &str| -> Option<Vec<f64>> {
         let radians = v.as_ref()?.iter().map(|d| d.to_radians());
-        Some(if at == column.0 { radians.collect() } else { super::samples::unwrapped(radians, period) })
+        Some(if at == column.0 { radians.collect() } else { unwrapped(radians, period) })
     };
     let gain = match (followed(&table, REFERENCE), followed(&theta, ANGLE)) {
-        (Some(table), Some(theta)) => crate::estimation::statistics::line(&table, &theta).0.abs(),
+        (Some(table), Some(theta)) => line(&table, &theta).0.abs(),
         (Some(table), None) => SensorRun::new(run.clone(), 0, None)
             .map_or(0.0, |r| magnitude(&[SensorRun { reference_rad: table, ..r }], period)),
         _ => 0.0,
@@ -152,7 +152,7 @@ pub(super) fn of_the_angle(run: &SensorRun) -> Option<String> {
     };
     let (size, largest) = (span(&values), values.iter().fold(f64::MIN, |m: f64, v| m.max(*v)));
     let fills = |turn: f64| size <= turn && size > FILLED * turn;
-    let (slope, start) = crate::estimation::statistics::line(&run.reference_rad, theta);
+    let (slope, start) = line(&run.reference_rad, theta);
     let left = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - slope * a - start);
     let follows = span(&left.collect::<Vec<_>>()) < SMALL * span(theta);
     let beside = by_gain(slope.abs(), &UNITS, true).filter(|found| follows && found.column == ANGLE);

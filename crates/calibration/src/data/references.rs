@@ -2,6 +2,7 @@
 //! another unit, or with another sign, is said and passed over.
 
 use crate::data::plausibility::Broken;
+use crate::data::track::wrapped;
 use crate::estimation::statistics::median;
 use crate::recording::Recording;
 
@@ -13,6 +14,7 @@ const ONE_RATE: f64 = 1e-3;
 const FEWEST_STEPS: usize = 16;
 /// A factor between them is a unit's within this share.
 const A_UNIT: f64 = 0.02;
+const TURN_DEG: f64 = 360.0;
 
 /// By which share the table's angle and the rate differ, where both were recorded and tell of the same rotation.
 ///
@@ -27,7 +29,7 @@ pub(super) fn references(recording: &Recording, name: &str, warnings: &mut Vec<S
     let fastest = rate.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
     let steps: Vec<[f64; 2]> = (1..t.len())
         .filter(|&i| rate[i - 1].abs().min(rate[i].abs()) > 0.1 * fastest && rate[i - 1] * rate[i] > 0.0)
-        .map(|i| [0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]), within_a_turn(table[i] - table[i - 1])])
+        .map(|i| [0.5 * (rate[i - 1] + rate[i]) * (t[i] - t[i - 1]), wrapped(table[i] - table[i - 1], TURN_DEG)])
         .filter(|[by_rate, _]| by_rate.is_finite() && *by_rate != 0.0)
         .collect();
     let close = steps.iter().filter(|step| step.iter().all(|d| d.abs() < 90.0));
@@ -74,9 +76,9 @@ fn apart(by: f64, unsure: f64, name: &str, warnings: &mut Vec<String>) -> f64 {
         return 0.0;
     }
     warnings.push(format!(
-        "{name}: table_deg turns by {:.2} % more than rate_dps says; table_deg is used, and where no other run tells which of \
-         the two is right, the angular gain's interval covers both",
-        100.0 * by
+        "{name}: table_deg turns {:.4} times as fast as rate_dps says; table_deg is used, and where no other run tells which \
+         of the two is right, the angular gain's interval covers both",
+        1.0 + by
     ));
     by.abs()
 }
@@ -90,7 +92,7 @@ fn beyond_half_a_turn(steps: &[[f64; 2]], name: &str, warnings: &mut Vec<String>
     let usual = median(&mut steps.iter().map(|[r, _]| r.abs()).collect::<Vec<_>>());
     let forward = median(&mut steps.iter().map(|[r, _]| *r).collect::<Vec<_>>()).signum();
     let off = |sign: f64| {
-        let mut off: Vec<f64> = steps.iter().map(|[r, t]| within_a_turn(t - sign * r)).collect();
+        let mut off: Vec<f64> = steps.iter().map(|[r, t]| wrapped(t - sign * r, TURN_DEG)).collect();
         let middle = median(&mut off);
         let mut scatter: Vec<f64> = off.iter().map(|d| (d - middle).abs()).collect();
         let unsure = 3.0 * median(&mut scatter) / (steps.len() as f64).sqrt();
@@ -116,11 +118,6 @@ fn the_other_way(name: &str) -> String {
 
 fn contradiction(problem: String) -> Broken {
     Broken { problem, wanted: "references that agree, or only the one that is right (the other column renamed)".into() }
-}
-
-/// An angle in degrees without its whole turns, −180 to 180.
-fn within_a_turn(deg: f64) -> f64 {
-    deg - 360.0 * (deg / 360.0).round()
 }
 
 #[cfg(test)]
@@ -155,7 +152,7 @@ mod tests {
         assert_eq!(mend(&mut with_table(1.0)), Findings::default());
         let findings = mend(&mut with_table(0.991));
         assert!((findings.references_apart - 9e-3).abs() < 1e-9, "{findings:?}");
-        assert!(findings.warnings[0].contains("turns by -0.90 % more"), "{findings:?}");
+        assert!(findings.warnings[0].contains("turns 0.9910 times as fast"), "{findings:?}");
         let broken = mend(&mut with_table(0.5)).broken;
         assert!(broken.is_some_and(|b| b.problem.contains("0.5000 times")));
         let mut radians = with_table(1.0);

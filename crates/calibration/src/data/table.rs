@@ -29,12 +29,13 @@ pub(crate) fn input_angle(recording: &mut Recording) -> (Vec<f64>, bool) {
             let counts = counts_turns(&table);
             (turned(&table), !counts)
         }
-        (None, Some(rate)) => (integrated(&rate, t), false),
+        (None, Some(rate)) => (integrated(t, &rate), false),
         (None, None) => (vec![0.0; t.len()], false),
     }
 }
 
-fn integrated(rate: &[f64], t: &[f64]) -> Vec<f64> {
+/// The angle, rad, that a rate in degrees goes by trapezoids.
+pub(crate) fn integrated(t: &[f64], rate: &[f64]) -> Vec<f64> {
     let mut angle = 0.0;
     let mut out = Vec::with_capacity(t.len());
     for i in 0..rate.len().min(t.len()) {

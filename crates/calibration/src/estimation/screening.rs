@@ -42,7 +42,7 @@ pub(crate) struct Screen {
     /// numbers of those that are not
     pub(crate) left_out: Vec<usize>,
     rotations: usize,
-    /// by which share the references of every run differ, that of the run where they differ least
+    /// by which share the references of every fitted run differ, that of the run where they differ least
     pub(crate) references_apart: f64,
 }
 
@@ -138,12 +138,14 @@ impl Screen {
             match findings.broken {
                 Some(what) => broken.push((number, run_name(&run), what)),
                 None => {
+                    if run.role == Role::Fit {
+                        apart = apart.min(findings.references_apart);
+                    }
                     sound.push(run);
-                    apart = apart.min(findings.references_apart);
                 }
             }
         }
-        self.references_apart = if sound.is_empty() { 0.0 } else { apart };
+        self.references_apart = if apart.is_finite() { apart } else { 0.0 };
         require_one_unit(&sound)?;
         let fitted = sound.iter().filter(|r| r.role == Role::Fit).count();
         let too_many = fitted == 0 || broken.len() as f64 > MOST_BROKEN * self.rotations as f64;
