@@ -7,6 +7,7 @@
 use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, Stage, Values};
 use cvg_model::{AxisForces, Envelope};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use crate::data::track::Track;
 use crate::estimation::joint_fit::Dataset;
@@ -142,17 +143,18 @@ impl Balance {
     fn left(&self, inverse_level: f64) -> f64 {
         let row = |(p, unclipped): (&Pair, &f64)| {
             let clips = p.largest * inverse_level > 1.0;
-            [if clips { self.pushed(p, inverse_level) } else { *unclipped }, p.sin2, p.cos2, p.q]
+            Vector4::new(if clips { self.pushed(p, inverse_level) } else { *unclipped }, p.sin2, p.cos2, p.q)
         };
-        let rows: Vec<[f64; 4]> = self.pairs.iter().zip(&self.unclipped).map(row).collect();
-        let mut equations = NormalEquations::new(4);
+        let rows: Vec<Vector4<f64>> = self.pairs.iter().zip(&self.unclipped).map(row).collect();
+        let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
         for (row, pair) in rows.iter().zip(&self.pairs) {
-            equations.add(row, pair.widening);
+            normal += row * row.transpose();
+            right += row * pair.widening;
         }
-        let found = equations.solve();
-        let off = |(row, pair): (&[f64; 4], &Pair)| {
-            (pair.widening - row.iter().zip(&found).map(|(a, b)| a * b).sum::<f64>()).powi(2)
-        };
+        let dynamic =
+            (DMatrix::from_column_slice(4, 4, normal.as_slice()), DVector::from_column_slice(right.as_slice()));
+        let found = Vector4::from_vec(NormalEquations::of(dynamic.0, dynamic.1).solve());
+        let off = |(row, pair): (&Vector4<f64>, &Pair)| (pair.widening - row.dot(&found)).powi(2);
         rows.iter().zip(&self.pairs).map(off).sum::<f64>() / self.pairs.len() as f64
     }
 

@@ -124,8 +124,9 @@ pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u3
 
 /// Samples of a segment that refine a frequency.
 const REFINED_SAMPLES: usize = 2_000;
-/// Parabolas through the top of a line, one within the other, and how much narrower the next is.
-const PARABOLAS: usize = 6;
+/// Parabolas through the top of a line, one within the other, and how much narrower the next is: the last is a fiftieth of the
+/// line's width, which is as near as a fit's prior has it.
+const PARABOLAS: usize = 3;
 const NARROWER: f64 = 0.2;
 /// A line between two points of the periodogram has at most this many times the power that it has there: at a quarter of
 /// its width off the top sinc² is 0.81.

@@ -1,6 +1,7 @@
 //! One linearisation for many models: the normal equations with every unknown that any of them has. Those of each model are
 //! rows and columns of it, so that what a model would leave costs no look at the data (Furnival and Wilson 1974).
 
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::estimation::fit::{Linearised, Prepared, Prior, at_rest, collect, solve, thinning};
@@ -36,14 +37,20 @@ impl Superset {
         Self { at: Linearised::new(&here, sums, priors, unknowns.len()), considered }
     }
 
-    /// Mean square that a step of the unknowns `own` would leave, to first order; none where they do not solve.
-    pub(crate) fn mean_square(&self, own: &[usize]) -> Option<f64> {
+    /// The step of the unknowns `own`, and the mean square that it would leave, to first order; none where they do not solve.
+    pub(crate) fn step(&self, own: &[usize]) -> Option<(DVector<f64>, f64)> {
         let normal = self.at.normal.select_rows(own).select_columns(own);
         let right = self.at.right.select_rows(own);
         let considered: Vec<Option<f64>> = own.iter().map(|&i| self.considered[i]).collect();
         let step = solve(&normal, &right, 0.0, &considered)?.step;
-        let count = self.at.samples();
-        (count > 0.0).then(|| (self.at.mean_square() - right.dot(&step) / count).max(0.0))
+        let count = self.samples();
+        let left = (self.at.mean_square() - right.dot(&step) / count).max(0.0);
+        (count > 0.0).then_some((step, left))
+    }
+
+    /// Residuals that are counted.
+    pub(crate) fn samples(&self) -> f64 {
+        self.at.samples()
     }
 }
 
@@ -102,10 +109,10 @@ pub(super) mod tests {
             let step = Effort { steps: 1, thinned: 400, polish: false };
             let fitted = fit(&tracks, &alone, &unknowns_of(&alone), &[], Role::Fit, step);
             let expected = fitted.left() / (fitted.counted[0] + fitted.counted[1]) as f64;
-            let found = superset.mean_square(&own).expect("a step");
+            let found = superset.step(&own).expect("a step").1;
             assert!((found - expected).abs() < 1e-9 * expected, "{left_out:?}: {found} and not {expected}");
             least = least.min(found);
         }
-        assert!(least < 1e-2 * superset.mean_square(&[0]).expect("a step"), "no effect took anything off");
+        assert!(least < 1e-2 * superset.step(&[0]).expect("a step").1, "no effect took anything off");
     }
 }

@@ -146,22 +146,27 @@ impl<'h> Predictor<'h> {
         let mut z = Envelope::zero();
         if self.readout.is_empty() {
             z = hypothesis.unread(seen, at);
-            out.theta = hypothesis.bearing(&z);
         }
+        // how bearing and ln of the amplitude change with the vibration
+        let mut by_envelope = None;
         for (chain, lanes) in self.readout.iter().zip(&unknowns.readout) {
             let moment = at.map(Jet::constant);
             let jets = chain.iter().fold(lifted(&seen), |e, (id, values)| id.unread(values, e, &moment));
-            let theta = hypothesis.bearing(&jets);
-            let energy = jets.pendulum().e;
+            z = part(&jets, |j| j.value);
+            // the same for every group of lanes
+            let (bearing, growth) = *by_envelope.get_or_insert_with(|| {
+                let [x_c, x_s, y_c, y_s] = hypothesis.bearing(&by_component(&z)).slope;
+                (Envelope::new(x_c, x_s, y_c, y_s), z * (1.0 / z.pendulum().e))
+            });
             let theta_rate = mechanical.then(|| jets.precession(&self.rate_of(&jets, forced.as_ref())));
             for (lane, &i) in lanes.columns.iter().enumerate() {
-                out.slopes[i][THETA] = theta.slope[lane];
-                out.slopes[i][LN_AMPLITUDE] = 0.5 * energy.slope[lane] / energy.value;
+                let moved = part(&jets, |j| j.slope[lane]);
+                out.slopes[i][THETA] = dot(&bearing, &moved);
+                out.slopes[i][LN_AMPLITUDE] = dot(&growth, &moved);
                 out.slopes[i][THETA_RATE] = theta_rate.map_or(0.0, |r| r.slope[lane]);
             }
-            z = part(&jets, |j| j.value);
-            out.theta = theta.value;
         }
+        out.theta = hypothesis.bearing(&z);
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
         (out.theta_rate, out.growth, out.steering) = (0.0, 0.0, [0.0; 2]);
@@ -281,6 +286,13 @@ impl<T: Real> Drive<T> {
 #[inline]
 fn part(e: &Envelope<Jet>, of: impl Fn(Jet) -> f64) -> Envelope<f64> {
     Envelope::new(of(e.x_c), of(e.x_s), of(e.y_c), of(e.y_s))
+}
+
+/// An envelope of which each component is an unknown of its own.
+#[inline]
+fn by_component(e: &Envelope<f64>) -> Envelope<Jet> {
+    let [x_c, x_s, y_c, y_s] = [e.x_c, e.x_s, e.y_c, e.y_s];
+    Envelope::new(Jet::unknown(x_c, 0), Jet::unknown(x_s, 1), Jet::unknown(y_c, 2), Jet::unknown(y_s, 3))
 }
 
 /// An envelope that does not depend on the unknowns.

@@ -17,13 +17,14 @@ use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::candidates;
 use crate::selection::consistency::{ask_every_run, in_its_place, rival_that_explains};
+use crate::selection::one_step::{Promise, promises};
 use crate::selection::pairs::best_pair;
 use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
     BY_AMPLITUDE, Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN,
-    NOTHING_LEFT, QUICK, REFUTED, Trial, balance, count, extend, extend_from, mean_square, on_fit, price, refit,
-    restore, sample_cost, validated,
+    NOTHING_LEFT, REFUTED, Trial, balance, count, extend_from, mean_square, on_fit, price, refit, restore, sample_cost,
+    validated,
 };
 
 /// Most effects that are added.
@@ -117,17 +118,7 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, A
             evaluate(&dataset.tracks, &fitted.fit.hypothesis, &fitted.fit.starts, Role::Fit, Window::Dense, None)
         });
     let candidates = candidates(dataset, &fitted.fit.hypothesis, &before, dense.as_ref().unwrap_or(&before));
-    let base_quick = mean_square(&refit(dataset, fitted, &fitted.fit.hypothesis, QUICK));
-    let mut ranked: Vec<Trial> = candidates
-        .into_par_iter()
-        .filter_map(|candidate| {
-            let fit = refit(dataset, fitted, &extend(&fitted.fit.hypothesis, &candidate, Origin::Discovered), QUICK);
-            let n = count(&fit);
-            let gain = n * (base_quick / mean_square(&fit)).ln() - price(&candidate, n);
-            gain.is_finite().then_some(Trial { candidate, fit, gain, balance: None, refuted: false })
-        })
-        .collect();
-    ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let ranked = promises(dataset, fitted, &candidates);
     if dataset.excess() < NOTHING_LEFT && ranked.first().is_none_or(|best| best.gain < 0.0) {
         return Ok(None);
     }
@@ -165,11 +156,13 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, A
     }
 }
 
-/// Candidates refitted in full beside a base that was refitted as well, best first.
-fn tried_carefully(dataset: &Dataset, fitted: &Fitted, quick: &[Trial], base: &Fit) -> Vec<Trial> {
-    let careful =
-        |quick: &Trial| Trial { fit: refit(dataset, fitted, &quick.fit.hypothesis, CAREFUL), ..quick.clone() };
-    let mut trials: Vec<Trial> = quick.par_iter().map(careful).collect();
+/// Candidates refitted in full from where one step led, beside a base that was refitted as well, best first.
+fn tried_carefully(dataset: &Dataset, fitted: &Fitted, promises: &[Promise], base: &Fit) -> Vec<Trial> {
+    let careful = |p: &Promise| {
+        let fit = refit(dataset, fitted, &p.hypothesis, CAREFUL);
+        Trial { candidate: p.candidate.clone(), fit, gain: p.gain, balance: None, refuted: false }
+    };
+    let mut trials: Vec<Trial> = promises.par_iter().map(careful).collect();
     let Some(best) = trials.iter().min_by(|a, b| mean_square(&a.fit).total_cmp(&mean_square(&b.fit))) else {
         return trials;
     };

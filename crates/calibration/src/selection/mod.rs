@@ -4,6 +4,7 @@ pub(crate) mod candidates;
 pub(crate) mod consistency;
 pub(crate) mod discovery;
 pub(crate) mod last_step;
+mod one_step;
 mod pairs;
 pub(crate) mod step;
 mod together;

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
-use crate::estimation::subsets::Superset;
-use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::selection::candidates::{Candidate, candidates};
+use crate::selection::one_step::OneStep;
 use crate::selection::step::{Accepted, State};
 use crate::selection::trial::{
     Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, NOTHING_LEFT, QUICK, REFUTED, balance, count,
@@ -87,27 +87,11 @@ pub(super) fn best_pair(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option
 
 /// Every pair of different effects after one linear step, the most promising first.
 fn promising(dataset: &Dataset, fitted: &Fitted, causes: &[Candidate]) -> Vec<[usize; 2]> {
-    let mut all = fitted.fit.hypothesis.clone();
-    for cause in causes {
-        all = extend(&all, cause, Origin::Discovered);
-    }
-    let unknowns = dataset.unknowns(&all);
-    let priors = dataset.priors(&all, fitted.drive.as_ref());
-    let superset = Superset::new(&dataset.tracks, &all, &unknowns, &priors, QUICK.thinned);
-    let member = |c: &Candidate| all.members.iter().position(|m| m.id == c.id && m.values == c.values);
-    let members: Vec<Option<usize>> = causes.iter().map(member).collect();
-    let of_pair = |pair: &[usize; 2]| -> Vec<usize> {
-        let taken = |m: usize| pair.iter().any(|&c| members[c] == Some(m));
-        let own = |u: &Unknown| match u {
-            Unknown::Effect(m, _) => taken(*m) || !members.contains(&Some(*m)),
-            _ => true,
-        };
-        (0..unknowns.len()).filter(|&i| own(&unknowns[i])).collect()
-    };
+    let one_step = OneStep::new(dataset, fitted, &causes.iter().collect::<Vec<_>>());
     let pairs = (0..causes.len()).flat_map(|i| (i + 1..causes.len()).map(move |j| [i, j]));
     let mut ranked: Vec<(f64, [usize; 2])> = pairs
         .filter(|[i, j]| causes[*i].id != causes[*j].id)
-        .filter_map(|pair| Some((superset.mean_square(&of_pair(&pair))?, pair)))
+        .filter_map(|pair| Some((one_step.mean_square(&pair)?, pair)))
         .collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     ranked.into_iter().map(|(_, pair)| pair).collect()
