@@ -5,8 +5,9 @@ use super::curve::{mean_radius, undone};
 use super::ellipse;
 use super::readout::Readout;
 use super::reference_free::largest_gap;
-use super::samples::{SensorRun, span};
+use super::samples::SensorRun;
 use crate::error::Refusal;
+use crate::numerics::statistics::span;
 
 /// Share of the runs that may be left out.
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;

@@ -28,7 +28,7 @@ pub(crate) fn gain(before: &[Vec<f64>], after: &[Vec<f64>], unknowns: usize) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::statistics::remembered;
+    use crate::numerics::statistics::remembered;
 
     #[test]
     fn the_innovation_of_an_autoregression_is_its_own() {

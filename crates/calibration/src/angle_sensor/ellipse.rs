@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::readout::{LARGEST_AXES_RATIO, Readout};
 use super::samples::SensorRun;
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::linear::NormalEquations;
 
 /// The algebraic ellipse through the points of all runs: a x² + b xy + c y² + d x + e y = 1 by least squares.
 pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {

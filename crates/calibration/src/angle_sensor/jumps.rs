@@ -4,10 +4,11 @@
 //! A table that turns back from one row to the next parts from an angle that is late by a part of a row as well, or from one
 //! that was summed by another rule. That goes with the change of the rate, row by row, and is a lag's.
 
-use super::samples::{span, unwrapped};
 use crate::data::slips::slips;
 use crate::data::table::{integrated, turned};
-use crate::estimation::statistics::median;
+use crate::numerics::angles::unwrapped;
+use crate::numerics::statistics::median;
+use crate::numerics::statistics::span;
 use crate::recording::Run;
 
 /// Parts of a run whose increments tell how far the angle goes with the reference.

@@ -5,9 +5,9 @@
 
 use statrs::function::erf::erfc;
 
-use super::samples::span;
 use super::table_fit::{Sample, TableFit, only_phase};
-use crate::estimation::statistics::{lower_quartile, median};
+use crate::numerics::statistics::span;
+use crate::numerics::statistics::{lower_quartile, median};
 
 /// False-alarm probability over all lines tried.
 const FALSE_ALARM: f64 = 0.01;
@@ -108,8 +108,8 @@ fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {
 mod tests {
     use super::super::table_fit::{Motion, Shape};
     use super::*;
-    use crate::estimation::statistics::remembered;
     use crate::model::angle_table::Form;
+    use crate::numerics::statistics::remembered;
 
     /// Stations 5° apart of which every third is left out, and a line of 36 per turn, which is half their number.
     #[test]

@@ -28,4 +28,3 @@ mod table_fit;
 mod units;
 
 pub(crate) use identify::{identify, serves};
-pub(crate) use samples::{span, unwrapped};

@@ -15,7 +15,7 @@ use super::cross_validation::Folds;
 use super::samples::{Reading, SensorRun};
 use super::selection::VARYING_RATE;
 use super::sensor::{Sensor, centred};
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::linear::NormalEquations;
 
 /// One of the three terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

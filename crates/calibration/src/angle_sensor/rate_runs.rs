@@ -1,10 +1,12 @@
 //! Which runs of a rate gyroscope can be believed, each by itself and beside the others, and where in a run its angle and its
 //! reference part by what neither bias, scale factor nor lag makes.
 
-use super::samples::{Reading, SensorRun, span, unwrapped};
+use super::samples::{Reading, SensorRun};
 use crate::error::Refusal;
-use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::{median, robust_deviation};
+use crate::numerics::angles::unwrapped;
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::span;
+use crate::numerics::statistics::{median, robust_deviation};
 use crate::report::gate::unit;
 
 /// Share of the runs that may be left out.

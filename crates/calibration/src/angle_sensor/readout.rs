@@ -176,7 +176,7 @@ mod tests {
             let theta = f64::from(i) * 0.1;
             let (x, y) = (c(theta.cos(), 0.05), c(theta.sin(), -0.03));
             let z = [300.0 + 500.0 * (0.02 + x), -70.0 + 500.0 * 1.1 * (y + 0.04 * x)];
-            let off = crate::data::track::wrapped(readout.angle(z) - theta, std::f64::consts::TAU);
+            let off = crate::numerics::angles::wrapped(readout.angle(z) - theta, std::f64::consts::TAU);
             assert!(off.abs() < 1e-9, "{theta}: {off}");
         }
     }

@@ -2,8 +2,8 @@
 
 use super::readout::{Kind, Readout};
 use super::samples::SensorRun;
-use crate::data::track::wrapped;
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::angles::wrapped;
+use crate::numerics::linear::NormalEquations;
 
 /// How much angle and radius count against each other. None is right for all devices: which one predicts the angle best
 /// is found by cross-validation.

@@ -3,8 +3,8 @@
 
 use super::rails::without_rails_of_their_own;
 use crate::data::table::{integrated, turned};
-use crate::data::track::wrapped;
 use crate::error::Refusal;
+use crate::numerics::statistics::span;
 use crate::recording::{Campaign, Reference, Role, Run};
 
 /// What one run recorded of the instrument.
@@ -184,22 +184,6 @@ fn last_quarter_apart(run: &SensorRun) -> (SensorRun, SensorRun) {
     (run.subset(&rows[..cut]), SensorRun { role: Role::Holdout, ..run.subset(&rows[cut..]) })
 }
 
-/// An angle of any wrapping as a continuous one: each step is the shortest of the period.
-pub(crate) fn unwrapped(angles: impl Iterator<Item = f64>, period: f64) -> Vec<f64> {
-    let mut out: Vec<f64> = Vec::with_capacity(angles.size_hint().0);
-    for raw in angles {
-        let last = out.last().copied().unwrap_or(raw);
-        out.push(last + wrapped(raw - last, period));
-    }
-    out
-}
-
-/// Largest less smallest.
-pub(crate) fn span(values: &[f64]) -> f64 {
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    if high > low { high - low } else { 0.0 }
-}
-
 /// Derivative over uneven steps: second order inside, first order at the ends.
 fn gradient(y: &[f64], t: &[f64]) -> Vec<f64> {
     let n = y.len();
@@ -220,7 +204,6 @@ fn gradient(y: &[f64], t: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     #[test]
     fn the_gradient_of_a_parabola_over_uneven_steps_is_its_slope() {
@@ -228,16 +211,6 @@ mod tests {
         let y: Vec<f64> = t.iter().map(|t| 3.0 * t * t).collect();
         for (i, slope) in gradient(&y, &t).iter().enumerate().take(4).skip(1) {
             assert!((slope - 6.0 * t[i]).abs() < 1e-12, "{slope}");
-        }
-    }
-
-    #[test]
-    fn an_angle_of_any_wrapping_is_continuous() {
-        let wrapped = (0..100).map(|i| (f64::from(i) * 0.7).rem_euclid(TAU));
-        for (i, a) in unwrapped(wrapped, TAU).iter().enumerate() {
-            #[allow(clippy::cast_precision_loss, reason = "a hundred")]
-            let expected = i as f64 * 0.7;
-            assert!((a - expected).abs() < 1e-9);
         }
     }
 }

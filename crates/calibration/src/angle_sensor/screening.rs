@@ -4,11 +4,12 @@
 use super::agreement::of_one_sensor;
 use super::ellipse;
 use super::readout::Readout;
-use super::samples::{Reading, SensorRun, unwrapped};
+use super::samples::{Reading, SensorRun};
 use crate::data::copies::{copied_rows, said};
 use crate::data::plausibility::MOST_LOST;
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median, robust_deviation};
+use crate::numerics::angles::unwrapped;
+use crate::numerics::statistics::{line, median, robust_deviation};
 
 /// Share of the runs that may be left out.
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;

@@ -6,10 +6,10 @@ use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
 use super::units::{UNITS, Unit, by_gain};
-use crate::data::track::wrapped;
 use crate::error::Refusal;
-use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::{circular_mean, median};
+use crate::numerics::angles::wrapped;
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::{circular_mean, median};
 
 /// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one.
 const WHOLE: f64 = 0.02;
@@ -230,6 +230,6 @@ pub(super) fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
             v.iter().map(|z| start.angle(*z)).collect()
         }
     };
-    let followed = super::samples::unwrapped(theta.into_iter(), period);
-    crate::estimation::statistics::line(&longest.reference_rad, &followed).0.abs()
+    let followed = crate::numerics::angles::unwrapped(theta.into_iter(), period);
+    crate::numerics::statistics::line(&longest.reference_rad, &followed).0.abs()
 }

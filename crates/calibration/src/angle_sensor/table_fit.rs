@@ -1,7 +1,7 @@
 //! The fit of a table, and beside it of how the angle follows motion and of isolated lines of the reference.
 
-use crate::estimation::linear::NormalEquations;
 use crate::model::angle_table::{AngleTable, Form};
+use crate::numerics::linear::NormalEquations;
 
 /// How the angle follows motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

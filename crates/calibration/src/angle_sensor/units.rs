@@ -1,10 +1,12 @@
 //! In which unit an angle looks to be that is not in degrees: by the turn that its values fill where they wrap, and by how far
 //! it goes beside another, which a whole number of periods a turn makes one of few numbers.
 
-use super::samples::{Reading, SensorRun, span, unwrapped};
+use super::samples::{Reading, SensorRun};
 use super::sensor::magnitude;
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median};
+use crate::numerics::angles::unwrapped;
+use crate::numerics::statistics::span;
+use crate::numerics::statistics::{line, median};
 use crate::recording::Run;
 
 /// A unit of an angle and what one is in degrees.

@@ -4,7 +4,7 @@ use realfft::RealFftPlanner;
 
 use super::Carrier;
 use crate::error::Refusal;
-use crate::estimation::statistics::median;
+use crate::numerics::statistics::median;
 
 /// Rows that are transformed at most.
 const MOST_ROWS: usize = 1 << 17;

@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use cvg_model::Envelope;
 
-use crate::data::track::wrapped;
 use crate::error::Refusal;
+use crate::numerics::angles::wrapped;
 use crate::recording::{Campaign, Channel, Recording, RunKind};
 use windows::Window;
 pub(crate) use windows::phased;

@@ -4,7 +4,7 @@
 //! The angular gain of a device does not depend on the run. What may differ beside the noise of a run is its bias: a drift
 //! of the pattern, which a gain takes for its own at a steady rate.
 
-use crate::estimation::statistics::median;
+use crate::numerics::statistics::median;
 
 /// Gains agree within this share of themselves,
 const SHARE: f64 = 3e-3;

@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::data::copies;
 use crate::data::rail::rows_at_rails;
 use crate::data::references::references;
-use crate::estimation::statistics::median;
+use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording};
 
 /// A held value makes up for it by more than this many of its usual smallest steps.

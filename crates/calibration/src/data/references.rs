@@ -2,8 +2,8 @@
 //! another unit, or with another sign, is said and passed over.
 
 use crate::data::plausibility::Broken;
-use crate::data::track::wrapped;
-use crate::estimation::statistics::median;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::median;
 use crate::recording::Recording;
 
 /// A table and a rate agree within this share.

@@ -5,7 +5,8 @@
 //! have other aliases: what all of them agree on is told. What they do not tell is told by what the campaign states, or by
 //! nothing.
 
-use crate::estimation::statistics::median;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::median;
 
 /// Largest angular gain that a resonator can have: no mode is carried along by more than all of the rotation.
 pub(crate) const LARGEST_GAIN: f64 = 1.05;
@@ -342,11 +343,6 @@ impl Ambiguity {
             100.0 * STATED_TO
         )
     }
-}
-
-/// The representative of `angle` in [−period/2, period/2].
-fn wrapped(angle: f64, period: f64) -> f64 {
-    angle - period * (angle / period).round()
 }
 
 /// Picks [`ENOUGH`] places evenly among `count`.

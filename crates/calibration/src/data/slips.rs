@@ -4,7 +4,7 @@
 //! Such a jump is no error of the instrument. A segment that ends there and another that begins there have a bias each, and
 //! nothing of it is left.
 
-use crate::estimation::statistics::{median, robust_deviation};
+use crate::numerics::statistics::{median, robust_deviation};
 
 /// A jump is this many deviations of the usual steps.
 const JUMP: f64 = 10.0;

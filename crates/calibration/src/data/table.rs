@@ -5,8 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use super::track::wrapped;
-use crate::estimation::statistics::median;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::median;
 use crate::recording::Recording;
 
 /// A column that begins anew at each turn does not spread over more than this, degrees, by whichever end it begins.

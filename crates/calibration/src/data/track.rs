@@ -13,6 +13,8 @@ use crate::data::agreement::LARGEST_SPLIT_RAD_S;
 use crate::data::table;
 use crate::error::Refusal;
 use crate::model::prediction::Commands;
+use crate::numerics::angles::unwrapped;
+use crate::numerics::statistics::span;
 use crate::recording::{Role, Run};
 
 /// A rotation run, ready for a fit.
@@ -92,7 +94,7 @@ impl Track {
         let name = run_name(&run);
         let (settled, role) = (run.settled()?, run.role);
         let mut track = Self::whole(run, period_rad)?;
-        if spread(&track.input_rad) < 1e-9 {
+        if span(&track.input_rad) < 1e-9 {
             return Err(Refusal::new(
                 &name,
                 "column rate_dps or table_deg: the table does not turn in a rotation run",
@@ -200,9 +202,10 @@ impl Track {
                 in_phase: [x, y],
                 quadrature: recording.xs_v.take().zip(recording.ys_v.take()).map(|(x, y)| [x, y]),
             },
-            (_, _, Some(theta)) => {
-                Source::Angle { theta_rad: unwrapped(&theta, period_rad), amplitude: amplitude.unwrap_or(1.0) }
-            }
+            (_, _, Some(theta)) => Source::Angle {
+                theta_rad: unwrapped(theta.iter().map(|d| d.to_radians()), period_rad),
+                amplitude: amplitude.unwrap_or(1.0),
+            },
             _ => return Err(Refusal::new(&name, "there is neither xc_v and yc_v nor theta_deg", "one of the two")),
         };
         let commands = recording.vas_v.take().zip(recording.vqc_v.take()).map(|(a, q)| [held(a), held(q)]);
@@ -407,29 +410,6 @@ impl Track {
 pub(crate) fn commanded(seen: &Envelope<f64>, v: &ControlOutputs<f64>) -> AxisForces<f64> {
     let Direction { cos, sin, .. } = major_axis(seen, &seen.pendulum());
     ActuationGains { x: 1.0, y: 1.0 }.axis_forces_along(v, cos, sin)
-}
-
-/// max − min
-fn spread(values: &[f64]) -> f64 {
-    let (lo, hi) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    hi - lo
-}
-
-/// An angle in degrees of any wrapping as a continuous one in rad: each step is the shortest of the period.
-fn unwrapped(degrees: &[f64], period_rad: f64) -> Vec<f64> {
-    let mut out: Vec<f64> = Vec::with_capacity(degrees.len());
-    for d in degrees {
-        let raw = d.to_radians();
-        let last = out.last().copied().unwrap_or(raw);
-        out.push(last + wrapped(raw - last, period_rad));
-    }
-    out
-}
-
-/// The representative of `angle` in [−period/2, period/2].
-#[inline]
-pub(crate) fn wrapped(angle: f64, period: f64) -> f64 {
-    angle - period * (angle / period).round()
 }
 
 /// Missing commands take the value that was last given, as a held output does.

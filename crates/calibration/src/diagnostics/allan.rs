@@ -7,7 +7,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::linear::NormalEquations;
 
 /// Averaging times a decade.
 const TIMES_A_DECADE: f64 = 8.0;

@@ -5,12 +5,12 @@ use std::f64::consts::PI;
 use cvg_model::Envelope;
 use rayon::prelude::*;
 
-use crate::data::track::wrapped;
 use crate::diagnostics::allan::{self, FLICKER, Point};
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median, robust_deviation};
+use crate::facts::{Allan, AllanPoint, Estimate};
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{line, median, robust_deviation};
 use crate::recording::{Campaign, Instrument, Run, RunKind};
-use crate::report::{Allan, AllanPoint, Estimate};
 
 /// A time step longer than this many usual ones is a gap.
 const GAP: f64 = 1.5;

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use crate::estimation::linear::NormalEquations;
-use crate::report::Share;
+use crate::facts::Share;
+use crate::numerics::linear::NormalEquations;
 
 /// What an error may follow: a name, and a column of values for each of its unknowns.
 #[derive(Debug, Clone)]

@@ -11,11 +11,11 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
 use crate::data::track::Track;
 use crate::estimation::joint_fit::Dataset;
-use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::robust_deviation;
+use crate::facts::{EffectReport, Estimate, ParameterReport};
 use crate::model::hypothesis::{Hypothesis, Origin};
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::robust_deviation;
 use crate::recording::Role;
-use crate::report::{EffectReport, Estimate, ParameterReport};
 
 /// Pairs of neighbouring samples that are looked at.
 const LOOKED_AT: usize = 20_000;

@@ -1,13 +1,14 @@
 //! The error of a hypothesis on data that was not fitted: angle minus the best line, with angular gain and bias
 //! refitted on the same samples, after the hypothesis has removed what it knows.
 
-use crate::data::track::wrapped;
 use crate::estimation::bias::angle_dependent_bias;
 use crate::estimation::fit::Prepared;
 use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Residual, Window, residuals};
-use crate::estimation::statistics::{circular_mean, line, robust_deviation, white_noise};
+use crate::facts::ErrorSize;
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{circular_mean, line, robust_deviation, white_noise};
 use crate::recording::Role;
 
 /// Residuals further out than this many robust deviations are spikes.
@@ -15,17 +16,6 @@ const SPIKE: f64 = 6.0;
 
 /// Samples in a row that a spike may last.
 const LONGEST_SPIKE: usize = 2;
-
-/// Size of an angle error, deg.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct ErrorSize {
-    /// root mean square
-    pub rms_deg: f64,
-    /// largest magnitude
-    pub peak_deg: f64,
-    /// largest minus smallest, of the worst run
-    pub peak_to_peak_deg: f64,
-}
 
 /// The angle error of a hypothesis on the segments of one role.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::diagnostics::evaluate::Evaluation;
-use crate::report::Share;
+use crate::facts::Share;
 
 /// Harmonics of the pattern angle and of the table's, and those of the pattern that may go with rate, direction and
 /// amplitude: readout and drive make the second and the fourth.

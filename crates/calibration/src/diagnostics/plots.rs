@@ -4,18 +4,17 @@
 use cvg_model::effects::{EffectId, Scaling};
 use nalgebra::DMatrix;
 
-use crate::data::track::wrapped;
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::residual::{
-    Follows, Harmonic, WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band,
-};
+use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation, reported_harmonics, white_band};
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::propagation::{Start, Stepping, propagate};
-use crate::estimation::statistics::{circular_mean, line};
+use crate::facts::{Follows, Harmonic};
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::model::prediction::{Predictor, Vibration};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{circular_mean, line};
 use crate::recording::{Instrument, Role};
 
 /// Curves for the figures of a report.

@@ -2,37 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use realfft::RealFftPlanner;
-use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::diagnostics::evaluate::Evaluation;
 use crate::estimation::residuals::Residual;
-use crate::estimation::statistics::median;
-
-/// What a harmonic follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Follows {
-    /// the pattern angle
-    Pattern,
-    /// the table angle
-    Table,
-}
-
-/// One harmonic of a residual.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Harmonic {
-    /// what it follows
-    pub of: Follows,
-    /// harmonic number
-    pub n: u32,
-    /// amplitude, deg
-    pub amplitude_deg: f64,
-    /// half width of the 95 % interval of either quadrature component, deg
-    pub ci95_deg: f64,
-    /// phase of A cos(nθ + phase), deg
-    pub phase_deg: f64,
-}
+use crate::facts::{Follows, Harmonic};
+use crate::numerics::statistics::median;
 
 impl Residual {
     /// The angle that a harmonic follows, per sample.
@@ -109,7 +84,7 @@ pub(crate) fn resolved_harmonics(evaluation: &Evaluation, of: Follows, limit: u3
             s.base(of)
                 .windows(2)
                 .take(2000)
-                .map(|w| crate::data::track::wrapped(w[1] - w[0], std::f64::consts::TAU).abs())
+                .map(|w| crate::numerics::angles::wrapped(w[1] - w[0], std::f64::consts::TAU).abs())
         })
         .filter(|d| *d > 1e-9)
         .collect();

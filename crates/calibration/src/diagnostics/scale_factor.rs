@@ -9,12 +9,12 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::estimation::fit::{Effort, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted};
-use crate::estimation::linear::NormalEquations;
 use crate::estimation::residuals::{Residual, Window, residuals};
-use crate::estimation::statistics::robust_deviation;
+use crate::facts::{Estimate, ScaleFactor};
 use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::robust_deviation;
 use crate::recording::Role;
-use crate::report::{Estimate, ScaleFactor};
 
 /// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
 const BIAS_DPS: f64 = 0.004_2;

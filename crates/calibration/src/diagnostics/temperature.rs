@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::report::{Estimate, RunReport, Temperature};
+use crate::facts::{Estimate, RunReport, Temperature};
 
 /// Temperatures within a span of this tell nothing, K: engineering choice, ten times the accuracy of a usual sensor of them.
 const LEAST_SPAN_K: f64 = 2.0;

@@ -8,10 +8,11 @@ pub use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::effects::Moment;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::data::track::{commanded, wrapped};
+use crate::data::track::commanded;
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, robust_deviation};
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{line, robust_deviation};
 use crate::recording::{Run, RunKind};
 
 /// What one ring-down tells.
@@ -167,7 +168,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     let refuse = |problem: String, wanted: &str| Err(Refusal::new(&name, problem, wanted));
     let angle_rad = angle_deg.to_radians();
     let Phases { mut on, mut off, off_angle, decay } = phases(run, hypothesis, angle_rad, energy_off_s)?;
-    let middle = crate::estimation::statistics::median(&mut off_angle.clone());
+    let middle = crate::numerics::statistics::median(&mut off_angle.clone());
     let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
     if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
         return refuse(
@@ -197,7 +198,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
             break;
         }
     }
-    let level = crate::estimation::statistics::median(&mut on.ln_a.clone());
+    let level = crate::numerics::statistics::median(&mut on.ln_a.clone());
     on.drop_spikes(|_| level);
     // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
     let (trend, _) = line(&on.t_s, &on.ln_a);
@@ -239,7 +240,7 @@ fn command_that_goes_on(run: &Run, settled: std::ops::Range<usize>, energy_off_s
     let steady = energy_off_s - STEADY_SHARE * (energy_off_s - begin);
     let middle = 0.5 * (energy_off_s + rows.last()?.0);
     let usual =
-        |values: Vec<f64>| (!values.is_empty()).then(|| crate::estimation::statistics::median(&mut values.clone()));
+        |values: Vec<f64>| (!values.is_empty()).then(|| crate::numerics::statistics::median(&mut values.clone()));
     let within = |from: f64, to: f64| rows.iter().enumerate().filter(move |(_, (t, _))| *t > from && *t < to);
     let per_amplitude = |command: &[f64], from: f64, to: f64| {
         let all = within(from, to).map(|(i, (_, a))| command[settled.start + i] / a);

@@ -10,9 +10,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimation::fit::{Prepared, scaled_inverse};
 use crate::estimation::propagation::{Start, Stepping, propagate};
-use crate::estimation::statistics::median;
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::statistics::median;
 use crate::recording::{Instrument, Role};
 
 /// The energy balance of a hypothesis, with the force scale, the damping and the anisodamping that close it best.

@@ -2,7 +2,7 @@
 
 use cvg_model::Real;
 
-use crate::estimation::statistics::line;
+use crate::numerics::statistics::line;
 
 //= specs/equation-01.md#the-pattern-turns-against-the-input
 //# The pattern angle MUST be the bias less the effective angular gain times the integral of the input rate.

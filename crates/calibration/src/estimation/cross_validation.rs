@@ -70,9 +70,9 @@ mod tests {
     use super::*;
     use crate::estimation::fit::{Effort, Noise, fit};
     use crate::estimation::propagation::{Start, Stepping, propagate};
-    use crate::estimation::statistics::line;
     use crate::estimation::subsets::tests::turning;
     use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+    use crate::numerics::statistics::line;
     use crate::recording::Instrument;
     use cvg_model::effects::EffectId;
 

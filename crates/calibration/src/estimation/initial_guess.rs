@@ -5,11 +5,12 @@
 use rayon::prelude::*;
 
 use crate::data::agreement::Gain;
-use crate::data::track::{Segment, Track, wrapped};
+use crate::data::track::{Segment, Track};
 use crate::error::Refusal;
 use crate::estimation::propagation::Start;
-use crate::estimation::statistics::{circular_mean, line, median, robust_deviation};
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{circular_mean, line, median, robust_deviation};
 
 /// Steps between neighbours that a first estimate needs no more of.
 const ENOUGH: usize = 20_000;

@@ -13,9 +13,9 @@ use crate::estimation::initial_guess::Motion;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
-use crate::estimation::statistics::{median, robust_deviation, white_noise};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::statistics::{median, robust_deviation, white_noise};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.

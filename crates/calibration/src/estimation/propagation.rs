@@ -8,11 +8,12 @@
 use cvg_model::Envelope;
 use cvg_model::effects::Moment;
 
-use crate::data::track::{Segment, Track, wrapped};
+use crate::data::track::{Segment, Track};
 use crate::model::hypothesis::Hypothesis;
 use crate::model::jet::Jet;
 use crate::model::prediction::{Predictor, Vibration, quantity};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::angles::wrapped;
 use crate::recording::Instrument;
 
 /// What a pass says of one sample.

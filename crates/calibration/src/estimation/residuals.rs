@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use crate::data::track::{DENSE_SAMPLES, Segment, Track};
 use crate::estimation::fit::{Prepared, thinning};
 use crate::estimation::propagation::{Start, Stepping, propagate};
-use crate::estimation::statistics::circular_mean;
 use crate::model::hypothesis::{Hypothesis, direction};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::statistics::circular_mean;
 use crate::recording::Role;
 
 /// What part of a segment is looked at.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::estimation::coloured_noise::{ColouredNoise, Filter, Observation, Surroundings};
 use crate::estimation::normal::Normal;
-use crate::estimation::simplex::least;
+use crate::numerics::simplex::least;
 
 /// Where the search for each kind begins: what a good instrument on a good table shows (0.4°/√h; 1e-4 of a rate and
 /// 2e-4 of a gain over a run).

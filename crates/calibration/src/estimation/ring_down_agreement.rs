@@ -9,8 +9,8 @@ use cvg_model::effects::EffectId;
 use crate::error::Refusal;
 use crate::estimation::actuation::{RingDown, ring_down};
 use crate::estimation::joint_fit::Dataset;
-use crate::estimation::statistics::median;
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::statistics::median;
 use crate::recording::{Role, Run};
 
 /// A ring-down takes no drive that differs by a larger share than this from what the rotations take: gains of the axes that

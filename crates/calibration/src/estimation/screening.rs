@@ -6,13 +6,14 @@ use crate::data::agreement::{Gain, RunGain, Verdict, verdict};
 use crate::data::plausibility::mend;
 use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, other_turns, sampling, spread_over};
 use crate::data::slips::slips;
-use crate::data::track::{Track, run_name, wrapped};
+use crate::data::track::{Track, run_name};
 use crate::error::Refusal;
 use crate::estimation::initial_guess::{Guess, Motion, bearing, bearings, motion};
-use crate::estimation::statistics::median;
+use crate::facts::RunReport;
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::median;
 use crate::recording::{Instrument, Role, Run};
-use crate::report::RunReport;
 
 /// Angular gains that can be stated at all.
 const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
@@ -341,7 +342,7 @@ fn steps(track: &Track, hypothesis: &Hypothesis) -> Steps {
             }
         }
     }
-    out.interval_s = crate::estimation::statistics::median(&mut intervals);
+    out.interval_s = crate::numerics::statistics::median(&mut intervals);
     out
 }
 

@@ -6,7 +6,7 @@ use super::model::Model;
 use super::runs::DecayRun;
 use super::start::{begun, energy};
 use crate::error::Refusal;
-use crate::estimation::statistics::white_noise;
+use crate::numerics::statistics::white_noise;
 
 /// What is left contradicts a run beyond so many times what a part of a run leaves that is fitted alone,
 const CONTRADICTS: f64 = 4.0;

@@ -7,8 +7,8 @@ use super::model::Term;
 use super::report::{Finding, estimate, shown, whole, whole_raw};
 use super::runs::DecayRun;
 use super::selection::{Added, BELIEVED, is_declared, one_rate};
-use crate::data::track::wrapped;
 use crate::model::hypothesis::Origin;
+use crate::numerics::angles::wrapped;
 use crate::report::polar::polar;
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport, Rival};
 

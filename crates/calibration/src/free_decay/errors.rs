@@ -4,9 +4,9 @@ use super::fit::start_of;
 use super::model::{Model, Start};
 use super::runs::DecayRun;
 use super::stokes::State;
-use crate::data::track::wrapped;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::estimation::residuals::Residual;
+use crate::numerics::angles::wrapped;
 
 /// The least √(R² + S²)/E of an orbit that lies somewhere: a circle has no angle.
 const LEAST_LINE: f64 = 0.3;

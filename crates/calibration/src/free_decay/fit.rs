@@ -8,7 +8,7 @@ use super::noise::Autoregression;
 use super::runs::DecayRun;
 use super::start::energy;
 use super::stokes::State;
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::linear::NormalEquations;
 
 /// Along the orbit's amplitude, across it (the angle), and in quadrature.
 const DIRECTIONS: usize = 3;

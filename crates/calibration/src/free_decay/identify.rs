@@ -10,9 +10,10 @@ use super::report::{Errors, Finding, report};
 use super::runs::DecayRun;
 use super::selection::{Chosen, choose, instead, is_declared, is_sound, unseen_phase};
 use crate::error::Refusal;
-use crate::identification::{Identification, Options, run_report};
+use crate::identified::{Identification, Options};
 use crate::recording::{Campaign, RunKind};
 use crate::report::provenance;
+use crate::report::recorded::run_report;
 use crate::report::{Input, RunReport};
 
 /// A campaign of decays alone.

@@ -72,7 +72,7 @@ impl Autoregression {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::statistics::remembered;
+    use crate::numerics::statistics::remembered;
 
     #[test]
     fn what_is_left_of_remembered_noise_is_white_and_of_size_one() {

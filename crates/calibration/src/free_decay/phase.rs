@@ -42,7 +42,7 @@ fn columns(model: &Model, start: &Start, run: &DecayRun) -> [Vec<f64>; 5] {
         } else {
             let dt = run.t_s[i] - run.t_s[i - 1];
             let expected = 0.5 * (rate + run.envelopes[i - 1].1) * dt;
-            phase += expected + crate::data::track::wrapped(now - last - expected, std::f64::consts::TAU);
+            phase += expected + crate::numerics::angles::wrapped(now - last - expected, std::f64::consts::TAU);
             grown += 0.5 * (energy(&run.seen[i]) + energy(&run.seen[i - 1])) * dt;
         }
         last = now;

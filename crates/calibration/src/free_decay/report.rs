@@ -13,12 +13,14 @@ use super::selection::{Chosen, Instead, one_rate};
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::plots_of;
 use crate::diagnostics::residual::{
-    Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, inflation, ljung_box, reported_harmonics,
+    WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, inflation, ljung_box, reported_harmonics,
 };
 use crate::error::Refusal;
-use crate::identification::{BiasCurve, Figures, Identification, no_help};
+use crate::facts::Follows;
+use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::Instrument;
+use crate::report::benefit::no_help;
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::stages::stages;

@@ -9,7 +9,7 @@ use super::stokes::{self, State};
 use crate::carrier::phased;
 use crate::data::table::turned;
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median, white_noise};
+use crate::numerics::statistics::{line, median, white_noise};
 use crate::recording::{Role, Run};
 
 /// Stretches that a run is divided into at most.

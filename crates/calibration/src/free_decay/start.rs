@@ -4,7 +4,7 @@
 use super::model::Model;
 use super::runs::DecayRun;
 use super::stokes::{Mechanics, State};
-use crate::estimation::linear::NormalEquations;
+use crate::numerics::linear::NormalEquations;
 
 /// Share of a run that one integral covers.
 const COVERED: usize = 12;

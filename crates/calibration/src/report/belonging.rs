@@ -4,12 +4,13 @@
 
 use cvg_model::effects::EffectId;
 
-use crate::angle_sensor::{span, unwrapped};
-use crate::data::track::wrapped;
 use crate::error::Refusal;
-use crate::estimation::linear::NormalEquations;
-use crate::estimation::statistics::{line, median, robust_deviation};
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::angles::unwrapped;
+use crate::numerics::angles::wrapped;
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::span;
+use crate::numerics::statistics::{line, median, robust_deviation};
 use crate::recording::{Instrument, Recording};
 use crate::report::calibration::Calibration;
 use crate::report::gate::unit;

@@ -17,14 +17,15 @@ use rayon::prelude::*;
 
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{
-    Along, Follows, Harmonic, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, harmonics, inflation,
-    ljung_box, resolved_harmonics, strongest_line, white_band,
+    Along, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, harmonics, inflation, ljung_box,
+    resolved_harmonics, strongest_line, white_band,
 };
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::propagation::{Row, Stepping, propagate};
 use crate::estimation::residuals::Residual;
+use crate::facts::{Follows, Harmonic};
 use crate::model::hypothesis::Hypothesis;
 use crate::model::unknowns::Unknowns;
 use crate::recording::{Instrument, Role};
@@ -191,7 +192,7 @@ fn of_a_harmonic(e: &Evaluation, frequency_hz: f64) -> bool {
             return false;
         }
         let turns = |angle: &[f64]| {
-            let steps = angle.windows(2).map(|w| crate::data::track::wrapped(w[1] - w[0], std::f64::consts::TAU));
+            let steps = angle.windows(2).map(|w| crate::numerics::angles::wrapped(w[1] - w[0], std::f64::consts::TAU));
             (steps.sum::<f64>() / std::f64::consts::TAU / time).abs()
         };
         [turns(&s.direction), turns(&s.table)].into_iter().filter(|f| *f > 0.0).any(|f| {

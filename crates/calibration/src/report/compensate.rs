@@ -3,11 +3,12 @@
 
 use cvg_model::effects::{EffectId, Stage};
 
-use crate::data::track::{Track, wrapped};
+use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
+use crate::numerics::angles::wrapped;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
 use crate::report::belonging::{Row, left_in_the_radius, require_of_the_calibrated};
 use crate::report::calibration::Calibration;

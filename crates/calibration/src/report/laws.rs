@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector2, Vector4};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::residual::Follows;
+use crate::facts::Follows;
 use crate::model::written::Law;
 use crate::report::Exponent;
 

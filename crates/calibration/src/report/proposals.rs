@@ -6,14 +6,15 @@
 use cvg_model::effects::{EffectId, harmonic_n};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation};
+use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::residuals::{Residual, Window};
-use crate::estimation::statistics::line;
+use crate::facts::Follows;
 use crate::model::hypothesis::{Member, Origin};
 use crate::model::written::export::export;
 use crate::model::written::{EffectText, Law, ParameterText};
+use crate::numerics::statistics::line;
 use crate::recording::Role;
 use crate::report::channels::amplitudes;
 use crate::report::laws::{Scaling, waves, whole};

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use crate::estimation::statistics::median;
+use crate::numerics::statistics::median;
 use crate::recording::{Campaign, Instrument, Recording, RunKind};
 use crate::report::{EffectReport, Input};
 

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::error::Refusal;
-use crate::identification::run_report;
 use crate::recording::{Campaign, Instrument};
 use crate::report::provenance::{self, Named};
+use crate::report::recorded::run_report;
 use crate::report::{EffectReport, Estimate, Input, RunReport, SCHEMA, Status, Tool};
 
 /// What is known of a campaign before it is identified.

@@ -1,7 +1,8 @@
 //! From the raw angle to the last effect: the held-out error at every step, with what speaks for the step.
 
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::residual::{Follows, reported_harmonics};
+use crate::diagnostics::residual::reported_harmonics;
+use crate::facts::Follows;
 use crate::model::hypothesis::Origin;
 use crate::report::{Rival, StepReport};
 use crate::selection::step::Step;

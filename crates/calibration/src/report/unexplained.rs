@@ -4,10 +4,11 @@ use cvg_model::effects::{EffectId, harmonic_n};
 
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::residual::{
-    Along, Follows, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, inflation, ljung_box,
-    reported_harmonics, resolved_harmonics, strongest_harmonics, strongest_line,
+    Along, WHITENESS_LAGS, WHITENESS_LEVEL, autocorrelation, drift_power, inflation, ljung_box, reported_harmonics,
+    resolved_harmonics, strongest_harmonics, strongest_line,
 };
 use crate::estimation::joint_fit::Dataset;
+use crate::facts::Follows;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::report::{ResidualReport, Unexplained};
 use crate::selection::step::Step;

@@ -4,10 +4,9 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values, harmonic_n};
 
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::residual::{
-    Along, Follows, drift_power, resolved_harmonics, strongest_harmonics, strongest_line,
-};
+use crate::diagnostics::residual::{Along, drift_power, resolved_harmonics, strongest_harmonics, strongest_line};
 use crate::estimation::joint_fit::Dataset;
+use crate::facts::Follows;
 use crate::model::hypothesis::Hypothesis;
 use crate::recording::Instrument;
 

@@ -6,11 +6,12 @@
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::diagnostics::residual::{Follows, WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
+use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation, strongest_harmonics};
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
+use crate::facts::Follows;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;

@@ -3,12 +3,14 @@
 
 use cvg_model::effects::EffectId;
 
-use crate::diagnostics::evaluate::{ErrorSize, evaluate};
-use crate::diagnostics::residual::{Harmonic, pattern_harmonics};
+use crate::diagnostics::evaluate::evaluate;
+use crate::diagnostics::residual::pattern_harmonics;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::propagation::Start;
 use crate::estimation::residuals::Window;
+use crate::facts::ErrorSize;
+use crate::facts::Harmonic;
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::recording::Role;
 

@@ -8,7 +8,7 @@ use super::passes::{CHANNELS, Left, WANTED, learn, rms, walk, white};
 use super::report::report;
 use super::runs::{VirtualRun, all, parts};
 use crate::error::Refusal;
-use crate::identification::Options;
+use crate::identified::Options;
 use crate::recording::{Campaign, RunKind};
 use crate::report::survey::Innovation;
 use crate::survey::Surveyed;

@@ -7,11 +7,11 @@ use cvg_model::effects::{EffectId, Values};
 
 use super::identify::PACE_S;
 use crate::error::Refusal;
-use crate::identification::run_report;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::provenance;
+use crate::report::recorded::run_report;
 use crate::report::survey::{Innovation, NotTold, Survey, VirtualPrecession};
 use crate::report::{EffectReport, Estimate, ParameterReport, Status, Tool};
 use crate::survey::Surveyed;

@@ -6,9 +6,9 @@ use std::ops::Range;
 use cvg_estimator::direction::major_axis;
 use cvg_model::{AxisForces, Envelope};
 
-use crate::data::track::wrapped;
 use crate::error::Refusal;
-use crate::estimation::statistics::{line, median};
+use crate::numerics::angles::wrapped;
+use crate::numerics::statistics::{line, median};
 use crate::recording::{Role, Run};
 
 /// A row: what was read, and what was put out to the drives, V.

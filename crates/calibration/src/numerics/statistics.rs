@@ -62,6 +62,12 @@ pub(crate) fn circular_mean(angles: impl Iterator<Item = f64>, period: f64) -> f
     s.atan2(c) / k
 }
 
+/// Largest less smallest.
+pub(crate) fn span(values: &[f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    if high > low { high - low } else { 0.0 }
+}
+
 /// Noise for tests: a first-order autoregression of normal values with a deviation of one, from a generator of Lehmer's.
 #[cfg(test)]
 pub(crate) fn remembered(memory: f64, count: usize, seed: u64) -> Vec<f64> {

@@ -2,13 +2,47 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::diagnostics::evaluate::ErrorSize;
-use crate::diagnostics::residual::{Follows, Harmonic};
 use crate::model::hypothesis::Origin;
 use crate::model::written::EffectText;
 
 /// Identifier of the report's format.
 pub const SCHEMA: &str = "cvg.report/2";
+
+/// Size of an angle error, deg.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ErrorSize {
+    /// root mean square
+    pub rms_deg: f64,
+    /// largest magnitude
+    pub peak_deg: f64,
+    /// largest minus smallest, of the worst run
+    pub peak_to_peak_deg: f64,
+}
+
+/// What a harmonic follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Follows {
+    /// the pattern angle
+    Pattern,
+    /// the table angle
+    Table,
+}
+
+/// One harmonic of a residual.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Harmonic {
+    /// what it follows
+    pub of: Follows,
+    /// harmonic number
+    pub n: u32,
+    /// amplitude, deg
+    pub amplitude_deg: f64,
+    /// half width of the 95 % interval of either quadrature component, deg
+    pub ci95_deg: f64,
+    /// phase of A cos(nθ + phase), deg
+    pub phase_deg: f64,
+}
 
 /// What came of an identification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

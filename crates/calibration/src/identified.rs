@@ -1,0 +1,67 @@
+//! What an identification is asked, and what it gives.
+
+use cvg_model::effects::EffectId;
+
+use crate::angle_sensor::curve::Curve;
+use crate::diagnostics::plots::PlotData;
+use crate::estimation::actuation::RingDown;
+use crate::report::Report;
+use crate::report::calibration::Calibration;
+use crate::selection::step::Step;
+
+/// How an identification is run.
+pub struct Options<'a> {
+    /// look for undeclared effects
+    pub discover: bool,
+    /// effects written down as text ([`crate::EffectText::effect`]), which compete with the library's
+    pub effects: Vec<EffectId>,
+    /// told what is going on
+    pub progress: &'a dyn Fn(&str),
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self { discover: true, effects: Vec::new(), progress: &|_| {} }
+    }
+}
+
+/// An identified instrument.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// the facts
+    pub report: Report,
+    /// what to compensate with
+    pub calibration: Calibration,
+    /// curves to look at
+    pub figures: Figures,
+    /// the steps of discovery
+    pub steps: Vec<Step>,
+    /// what a person wants to see besides, where it was asked for
+    pub plots: Option<PlotData>,
+}
+
+/// Curves for a report, thinned to what a figure can show.
+#[derive(Debug, Clone, Default)]
+pub struct Figures {
+    /// held-out angle error against the pattern angle
+    pub bias: Vec<BiasCurve>,
+    /// ring-downs: name, angle in deg, amplitude over time
+    pub ring_downs: Vec<RingDown>,
+    /// of an angle sensor, what its two channels draw
+    pub channels: Option<Curve>,
+}
+
+/// Angle error of one held-out stretch.
+#[derive(Debug, Clone, Default)]
+pub struct BiasCurve {
+    /// run
+    pub name: String,
+    /// pattern angle within its period, deg
+    pub pattern_deg: Vec<f64>,
+    /// raw error, deg; empty where the raw angle does not turn
+    pub raw_deg: Vec<f64>,
+    /// after the declared model, deg
+    pub declared_deg: Vec<f64>,
+    /// after all, deg
+    pub discovered_deg: Vec<f64>,
+}

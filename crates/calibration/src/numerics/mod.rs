@@ -1,0 +1,6 @@
+//! Numerical methods that know nothing of instruments.
+
+pub(crate) mod angles;
+pub(crate) mod linear;
+pub(crate) mod simplex;
+pub(crate) mod statistics;
