@@ -79,12 +79,14 @@ for_each_scalar! {
     #[test]
     fn prop_the_compensated_allocation_makes_what_was_commanded(
         v in proptest::array::uniform4(-1.0..1.0_f64), theta in angles(), ratio in ratios(), skew in -0.5..0.5_f64,
+        phase in -0.5..0.5_f64,
     ) {
         let [zero, limit] = [0.0, 1e3].map(T::from_f64);
-        // the drives act in the library's order: gains, then skew
+        // the drives act in the library's order: gains, skew, phase
         let effects = [
             (EffectId::ActuationGainMismatch, [T::from_f64(ratio), zero, zero, zero]),
             (EffectId::ActuationSkew, [T::from_f64(skew), zero, zero, zero]),
+            (EffectId::ActuationPhase, [T::from_f64(phase), zero, zero, zero]),
         ];
         let inverse = ActuationCompensation::new(&effects).expect("within bounds");
         let allocation = Allocation::new(Some(inverse), limit).expect("a limit");

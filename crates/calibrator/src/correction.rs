@@ -53,12 +53,12 @@ impl<T: Float> Correction<T> {
         sound.then_some(made)
     }
 
-    fn values_are_of_a_device(&self) -> bool {
+    pub(crate) fn values_are_of_a_device(&self) -> bool {
         let far = |p: &Parameter| p.expected::<T>() * T::from_f64(FARTHEST);
         self.known.iter().zip(&Parameter::ALL).all(|(value, p)| value.within(far(p)))
     }
 
-    fn electronics_are_of_a_device(&self) -> bool {
+    pub(crate) fn electronics_are_of_a_device(&self) -> bool {
         let Self { y_of_y, y_of_x, drives, .. } = self;
         let near = |z: &Complex<T>, target: T, reach: f64| {
             (z.re - target).within(T::from_f64(reach)) && z.im.within(T::from_f64(reach))

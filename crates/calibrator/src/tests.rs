@@ -31,7 +31,7 @@ pub(crate) fn calibrator() -> Calibrator<f64> {
 #[test]
 fn a_cycle_lasts_ten_to_a_hundred_milliseconds() {
     let of = |control_s: f64, steps: u16| Calibrator::<f64>::new(&Settings { control_s, steps, ..settings() });
-    for (control_s, steps) in [(1.3e-4, 80), (1e-3, 80), (1e-3, 99)] {
+    for (control_s, steps) in [(1.3e-4, 80), (1e-3, 80), (1e-3, 99), (5e-4, 200)] {
         of(control_s, steps).expect("inside");
     }
     for (control_s, steps) in [(1.2e-4, 80), (1e-3, 101), (1e-3, 79), (f64::NAN, 80)] {

@@ -21,13 +21,34 @@ pub struct OrbitCommands<T> {
     pub v_ac: T,
 }
 
-/// The inverse of what the drives do to the commands: a 2×2 matrix from (x, y) to (x, y), the same for both phases.
+/// The inverse of what the drives do to the commands: A − iQ from (x, y) to (x, y), with each channel's phases as c + is.
+///
+/// A keeps the phase of a command; Q puts out, in phase, of what was commanded in quadrature, which undoes a phase of the drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationCompensation<T> {
+    pub(crate) same: Channels<T>,
+    pub(crate) quarter: Channels<T>,
+}
+
+/// A 2×2 matrix from (x, y) to (x, y).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Channels<T> {
     pub(crate) xx: T,
     pub(crate) xy: T,
     pub(crate) yx: T,
     pub(crate) yy: T,
+}
+
+impl<T: Float> Channels<T> {
+    #[inline(always)]
+    fn of_x(&self, x: T, y: T) -> T {
+        self.xx * x + self.xy * y
+    }
+
+    #[inline(always)]
+    fn of_y(&self, x: T, y: T) -> T {
+        self.yx * x + self.yy * y
+    }
 }
 
 impl<T: Float> ActuationCompensation<T> {
@@ -47,17 +68,23 @@ impl<T: Float> ActuationCompensation<T> {
             })
         };
         let (zero, one) = (T::zero(), T::one());
+        // drives act on one phase as on the other, a quarter of a period later: what they make of a command in phase says all
         let of_x = through(AxisForces { x_c: one, x_s: zero, y_c: zero, y_s: zero });
         let of_y = through(AxisForces { x_c: zero, x_s: zero, y_c: one, y_s: zero });
-        let determinant = of_x.x_c * of_y.y_c - of_y.x_c * of_x.y_c;
-        if !(determinant.magnitude() > T::ratio(1, 1000) && determinant.is_finite()) {
+        let times = |(a, b): (T, T), (c, d): (T, T)| (a * c - b * d, a * d + b * c);
+        let (x_of_x, y_of_x) = ((of_x.x_c, of_x.x_s), (of_x.y_c, of_x.y_s));
+        let (x_of_y, y_of_y) = ((of_y.x_c, of_y.x_s), (of_y.y_c, of_y.y_s));
+        let (straight, crossed) = (times(x_of_x, y_of_y), times(x_of_y, y_of_x));
+        let (re, im) = (straight.0 - crossed.0, straight.1 - crossed.1);
+        let size_2 = re * re + im * im;
+        if !(size_2 > T::ratio(1, 1_000_000) && size_2.is_finite()) {
             return Err(ConfigError { parameter: "effects", expected: "drives that push in every direction" });
         }
+        let over = |z: (T, T)| times(z, (re / size_2, -im / size_2));
+        let (xx, yy, xy, yx) = (over(y_of_y), over(x_of_x), over(x_of_y), over(y_of_x));
         Ok(Self {
-            xx: of_y.y_c / determinant,
-            xy: -of_y.x_c / determinant,
-            yx: -of_x.y_c / determinant,
-            yy: of_x.x_c / determinant,
+            same: Channels { xx: xx.0, xy: -xy.0, yx: -yx.0, yy: yy.0 },
+            quarter: Channels { xx: -xx.1, xy: xy.1, yx: yx.1, yy: -yy.1 },
         })
     }
 
@@ -65,11 +92,12 @@ impl<T: Float> ActuationCompensation<T> {
     //# The compensated allocation MUST make the forces along the orbit that were commanded.
     #[inline]
     fn apply(&self, f: AxisForces<T>) -> AxisForces<T> {
+        let (same, quarter) = (&self.same, &self.quarter);
         AxisForces {
-            x_c: self.xx * f.x_c + self.xy * f.y_c,
-            x_s: self.xx * f.x_s + self.xy * f.y_s,
-            y_c: self.yx * f.x_c + self.yy * f.y_c,
-            y_s: self.yx * f.x_s + self.yy * f.y_s,
+            x_c: same.of_x(f.x_c, f.y_c) + quarter.of_x(f.x_s, f.y_s),
+            x_s: same.of_x(f.x_s, f.y_s) - quarter.of_x(f.x_c, f.y_c),
+            y_c: same.of_y(f.x_c, f.y_c) + quarter.of_y(f.x_s, f.y_s),
+            y_s: same.of_y(f.x_s, f.y_s) - quarter.of_y(f.x_c, f.y_c),
         }
     }
 }

@@ -327,12 +327,11 @@ impl SupervisorState {
 }
 
 impl Wish {
-    /// The wish that a mode of operation fulfils.
+    /// The wish that whole angle or hold fulfils.
     #[inline]
     fn of(mode: Mode) -> Self {
         match mode {
             Mode::Hold => Self::Hold,
-            Mode::RingDown => Self::RingDown,
             _ => Self::WholeAngle,
         }
     }

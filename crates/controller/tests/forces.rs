@@ -292,6 +292,7 @@ fn the_short_way_is_the_whole_way<T: Float + Default>() {
     let effects = [
         (EffectId::ActuationGainMismatch, [1.3, 0.0, 0.0, 0.0].map(T::from_f64)),
         (EffectId::ActuationSkew, [0.2, 0.0, 0.0, 0.0].map(T::from_f64)),
+        (EffectId::ActuationPhase, [-0.3, 0.0, 0.0, 0.0].map(T::from_f64)),
     ];
     let inverse = ActuationCompensation::new(&effects).expect("regular");
     let edges = edges::<T>();
@@ -340,9 +341,10 @@ proptest! {
     #[test]
     fn all_four_commands_come_back_along_the_orbit_through_compensated_drives(
         v_as in -1.0_f64..1.0, v_qs in -1.0_f64..1.0, v_qc in -1.0_f64..1.0, v_ac in -1.0_f64..1.0,
-        theta in -3.1_f64..3.1, ratio in 0.5_f64..2.0, skew in -0.5_f64..0.5,
+        theta in -3.1_f64..3.1, ratio in 0.5_f64..2.0, skew in -0.5_f64..0.5, phase in -0.5_f64..0.5,
     ) {
         let effects = [
+            (EffectId::ActuationPhase, [phase, 0.0, 0.0, 0.0]),
             (EffectId::ActuationSkew, [skew, 0.0, 0.0, 0.0]),
             (EffectId::ActuationGainMismatch, [ratio, 0.0, 0.0, 0.0]),
         ];
@@ -350,7 +352,7 @@ proptest! {
         let allocation = Allocation::new(Some(inverse), 100.0).expect("valid");
         let (sin, cos) = theta.sin_cos();
         let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin).volts;
-        // the drives act in the library's order: gains, then skew
+        // the drives act in the library's order: gains, skew, phase
         let forces = effects.iter().rev().fold(drive, |f, (id, values)| id.actuate(values, f)).along_orbit(theta);
         prop_assert!((forces.a_s - v_as).abs() < 1e-12);
         prop_assert!((forces.q_s - v_qs).abs() < 1e-12);

@@ -38,6 +38,8 @@ fn a_step_is_equation_3_on_the_sum_of_the_errors() {
 fn the_tuning_rule_places_the_poles() {
     let (omega, damping, a, b): (f64, f64, f64, f64) = (6.0, 0.7, 0.8, 1.5);
     let pi = Pi::tuned(omega, damping, a, b, 1e-5, 1e3).expect("valid");
+    assert_relative_eq!(pi.gain(), damping * omega / (a * b), max_relative = 1e-15);
+    assert_relative_eq!(pi.integration_time_s(), damping / omega, max_relative = 1e-15);
     let mut state = PiState::default();
     // Ė = −2ab v, from a unit of error: the response of s² + 2ζω s + ω² is known
     let (mut e, mut t) = (1.0, 0.0);

@@ -94,8 +94,12 @@ fn the_loop_that_holds_the_pattern() {
 #[test]
 fn the_way_to_the_drives() {
     fn drives<T: Float>() -> Allocation<T> {
-        let effects = [(EffectId::ActuationGainMismatch, [1.25, 0.0]), (EffectId::ActuationSkew, [0.25, 0.0])]
-            .map(|(id, [first, second])| (id, [first, second, 0.0, 0.0].map(T::from_f64)));
+        let effects = [
+            (EffectId::ActuationGainMismatch, 1.25),
+            (EffectId::ActuationSkew, 0.25),
+            (EffectId::ActuationPhase, -0.2),
+        ]
+        .map(|(id, value)| (id, [value, 0.0, 0.0, 0.0].map(T::from_f64)));
         let compensation = ActuationCompensation::new(&effects).expect("valid");
         Allocation::new(Some(compensation), T::from_f64(5.0)).expect("valid")
     }

@@ -220,8 +220,14 @@ impl<T: Float> Demodulator<T> {
         };
         let (x_c, x_s) = solve(window.mixed.x_c, window.mixed.x_s, window.x);
         let (y_c, y_s) = solve(window.mixed.y_c, window.mixed.y_s, window.y);
-        // the sum is a number only if all four are, and none is far out of range
-        let size = x_c.magnitude() + x_s.magnitude() + y_c.magnitude() + y_s.magnitude();
-        if size < self.most_v { Some(Envelope::new(x_c, x_s, y_c, y_s)) } else { None }
+        self.plausible(Envelope::new(x_c, x_s, y_c, y_s))
+    }
+
+    /// The envelope, if all four parts of it are numbers and none is far out of range.
+    #[inline(always)]
+    pub(crate) fn plausible(&self, e: Envelope<T>) -> Option<Envelope<T>> {
+        // the sum is a number only if all four are
+        let size = e.x_c.magnitude() + e.x_s.magnitude() + e.y_c.magnitude() + e.y_s.magnitude();
+        if size < self.most_v { Some(e) } else { None }
     }
 }

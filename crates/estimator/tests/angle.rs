@@ -63,6 +63,19 @@ fn an_envelope_without_direction_holds_the_last_reading_and_says_so() {
     assert_eq!(angle.step(&mut state, &orbit(0.31, 0.0, 0.0)).status, Status::Valid);
 }
 
+/// A circle vibrates as much as a line, and lies nowhere.
+#[test]
+fn a_circle_has_no_angle() {
+    let angle = tracker(Period::Pattern);
+    let mut state = AngleState::default();
+    angle.step(&mut state, &orbit(0.5, 0.0, 0.0));
+    for e in [Envelope::new(1.0, 0.0, 0.0, 1.0), Envelope::new(0.0, 0.5, -0.5, 0.0)] {
+        let reading = angle.step(&mut state, &e);
+        assert_eq!((reading.status, reading.periods), (Status::Undetermined, 0), "{e:?}");
+        assert_abs_diff_eq!(reading.within_rad, 0.5, epsilon = 1e-15);
+    }
+}
+
 #[test]
 fn a_threshold_that_is_no_amplitude_is_refused() {
     for bad in [-1.0, f64::NAN, f64::INFINITY] {

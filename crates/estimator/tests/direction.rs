@@ -3,8 +3,8 @@
 
 use core::f64::consts::PI;
 
-use cvg_estimator::Status;
 use cvg_estimator::direction::{major_axis, major_axis_of};
+use cvg_estimator::{Direction, Status};
 use cvg_model::{Envelope, Float, Orbit, Real};
 
 fn rounded<T: Float>(e: &Envelope<f64>) -> Envelope<T> {
@@ -33,6 +33,15 @@ fn it_is_the_orbits_orientation_at_every_angle_of_the_full_turn() {
             assert!(off::<f64>(orbit) < 1e-15, "{orbit:?}");
             assert!(off::<f32>(orbit) < 4e-7, "{orbit:?}");
         }
+    }
+}
+
+#[test]
+fn its_angle_is_over_the_full_turn() {
+    for k in -11..=12 {
+        let theta = f64::from(k) * PI / 12.0;
+        let d = Direction { cos: theta.cos(), sin: theta.sin(), status: Status::Valid };
+        assert!((d.angle() - theta).abs() < 1e-15, "{theta}: {}", d.angle());
     }
 }
 

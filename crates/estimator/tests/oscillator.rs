@@ -107,6 +107,11 @@ fn the_fastest_loop_that_a_period_realises_is_just_below_one() {
     assert!(new(1023.9, 1.0).is_ok() && new(2047.9, 0.5).is_ok());
     assert_eq!(new(1024.0, 1.0).map_err(|e| e.parameter), Err("bandwidth_rad_s"));
     assert_eq!(new(2048.0, 0.5).map_err(|e| e.parameter), Err("bandwidth_rad_s"));
+    // what is no number by itself is named by itself
+    for bad in [0.0, -0.5, f64::INFINITY, f64::NAN] {
+        assert_eq!(new(30.0, bad).map_err(|e| e.parameter), Err("damping"), "{bad}");
+        assert_eq!(new(bad, 1.0).map_err(|e| e.parameter), Err("bandwidth_rad_s"), "{bad}");
+    }
 }
 
 #[test]

@@ -242,6 +242,13 @@ impl<T: Float> Instrument<T> {
         let actuation = if actuation.is_empty() { None } else { Some(ActuationCompensation::new(actuation)?) };
         // the hold's middle is half a sample after its beginning
         let delay_s = s.readout_delay_s + s.drive_delay_s + 0.5 * period_s;
+        // the drives follow a correction to first order: up to here within 0.22 rad, and 1.42 times as large
+        if limit_rad_s * delay_s >= 1.0 {
+            return Err(ConfigError {
+                parameter: "drive_delay_s",
+                expected: "so short that the band turns less than a radian in the loop's delay",
+            });
+        }
         let (delay_sin, delay_cos) = Real::sin_cos(omega * delay_s);
         Ok(Self {
             oscillator,

@@ -29,6 +29,31 @@ fn reads(id: EffectId, values: Values<f64>, expected: Envelope<f64>, left: f64) 
     assert!((back - VIBRATION).pendulum().e.sqrt() <= left, "{id}: {back:?}");
 }
 
+/// What follows a recording's clock or its thermometer says so, and nothing else does: the electronics refuse what says so.
+#[test]
+fn what_follows_the_time_or_the_temperature_says_so() {
+    for &id in EffectId::ALL {
+        let mut values = id.neutral::<f64>();
+        for (v, p) in values.iter_mut().zip(id.description().parameters) {
+            *v += 3.0 * p.scale;
+        }
+        let follows = |other: Moment<f64>| {
+            id.read(&values, VIBRATION, &now()) != id.read(&values, VIBRATION, &other)
+                || id.input_rate(&values, 0.5, &now()) != id.input_rate(&values, 0.5, &other)
+        };
+        assert_eq!(id.in_time(), follows(Moment { t_s: 4.0, ..now() }), "{id}");
+        assert_eq!(id.by_temperature(), follows(Moment { warmer_k: -3.0, ..now() }), "{id}");
+    }
+}
+
+/// Another scalar's moment is the same moment.
+#[test]
+fn a_moment_is_mapped_number_by_number() {
+    let mapped = now().map(|v| 2.0 * v);
+    let drive = AxisForces { x_c: 0.6, x_s: -0.4, y_c: 0.2, y_s: 0.8 };
+    assert_eq!(mapped, Moment { t_s: 5.0, table_rad: 1.4, precession_rad_s: -0.8, warmer_k: 10.0, drive });
+}
+
 #[test]
 fn drives_act_on_both_phases_alike() {
     let f = AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.0, y_s: 0.25 };
@@ -109,6 +134,19 @@ fn a_clipped_carrier_is_scaled_by_its_describing_function() {
             assert_abs_diff_eq!(gain(drive, x), 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt()), epsilon = 1e-14);
         }
     }
+    // each drive by its own level, as each channel
+    let f = AxisForces { x_c: 3.0, x_s: 4.0, y_c: 0.3, y_s: -0.4 };
+    let clipped = EffectId::DriveSaturation.actuate(&[0.4, 0.0, 0.0, 0.0], f);
+    let r: f64 = 1.0 / (0.4 * 5.0);
+    let by = 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt());
+    assert_abs_diff_eq!(clipped.x_c, 3.0 * by, epsilon = 1e-14);
+    assert_abs_diff_eq!(clipped.x_s, 4.0 * by, epsilon = 1e-14);
+    assert_eq!((clipped.y_c, clipped.y_s), (0.3, -0.4));
+    let clipped = EffectId::DriveSaturation
+        .actuate(&[0.4, 0.0, 0.0, 0.0], AxisForces { x_c: 0.3, x_s: -0.4, y_c: -4.0, y_s: 3.0 });
+    assert_eq!((clipped.x_c, clipped.x_s), (0.3, -0.4));
+    assert_abs_diff_eq!(clipped.y_c, -4.0 * by, epsilon = 1e-14);
+    assert_abs_diff_eq!(clipped.y_s, 3.0 * by, epsilon = 1e-14);
     // beyond 4/π of the clip level there is no vibration: the largest drive that is considered, of ten
     let most = EffectId::DetectionSaturation.unread(&[1.0, 0.0, 0.0, 0.0], Envelope::new(2.0, 0.0, 0.0, 1.0), &now());
     assert_eq!(most, Envelope::new(10.0, 0.0, 0.0, 1.0));

@@ -12,6 +12,7 @@ mod estimator;
 mod instrument;
 mod meaning;
 mod model;
+mod reading;
 mod regression;
 mod single;
 mod unseen;
@@ -63,6 +64,7 @@ fn library() -> Vec<Fault> {
         edges::FAULTS,
         unseen::FAULTS,
         &upkeep::faults(),
+        &reading::faults(),
         single::FAULTS,
         meaning::FAULTS,
     ]

@@ -5,7 +5,7 @@ use crate::commit::{DECIDE, WEIGH};
 use crate::correction::Correction;
 use crate::parameters::{OTHERS, Parameter as P};
 use crate::record::{BYTES, Refused};
-use crate::state::{Commit, State, Work};
+use crate::state::{Commit, Filter, State, Work};
 use crate::ud::{Ud, Update};
 
 /// A filter that took some measurements, so that everything hangs together.
@@ -17,6 +17,11 @@ pub(super) fn correlated(variance: f64) -> Ud<f64> {
         ud.measure(&mut update, &h, 0.3 * variance);
     }
     ud
+}
+
+/// A filter that knows the detection well.
+fn told() -> Filter<f64> {
+    Filter { ud: Ud::diagonal(1e-6), ..Filter::new() }
 }
 
 fn due(stage: u8) -> State<f64> {
@@ -125,28 +130,31 @@ fn a_direction_of_the_detection_is_committed_beyond_three_deviations_only() {
         before.filter.mean = unit(P::DetectionPhase, 2.0);
         near(moved(&before, &committed(before))[P::DetectionPhase as usize], expected, 1e-12);
     }
-    // ratio and skew that hang together: along the direction that is told, across it not
-    let mut before = due(3);
-    before.filter.ud = Ud::with_last(1e-4, &[1e-4, 1e-6, 1e-2, 0.0, 0.0, 0.2]).expect("a covariance");
-    before.filter.mean = [0.0; N];
-    (before.filter.mean[OTHERS + 1], before.filter.mean[OTHERS + 2]) = (0.05, 0.05);
-    let by = moved(&before, &committed(before));
-    let (ug, us) = (0.03, 6e-3);
-    let ud = &before.filter.ud;
-    let (gg, ss) = (ud.variance(OTHERS + 1) * ug * ug, ud.variance(OTHERS + 2) * us * us);
-    let gs = ud.covariance(OTHERS + 1, OTHERS + 2) * ug * us;
-    let angle = 0.5 * f64::atan2(2.0 * gs, gg - ss);
-    let (mut g, mut k) = (0.0, 0.0);
-    let mut told = 0;
-    for (x, y) in [(angle.cos(), angle.sin()), (-angle.sin(), angle.cos())] {
-        let (along, variance) = (x * 0.05 * ug + y * 0.05 * us, x * x * gg + 2.0 * x * y * gs + y * y * ss);
-        if along.abs() > 3.0 * variance.sqrt() {
-            (g, k, told) = (g + x * along, k + y * along, told + 1);
+    // ratio and skew that hang together, in either sense: along the direction that is told, across it not
+    for hang in [0.2, -0.2] {
+        let mut before = due(3);
+        before.filter.ud = Ud::with_last(1e-4, &[1e-4, 1e-6, 1e-2, 0.0, 0.0, hang]).expect("a covariance");
+        before.filter.mean = [0.0; N];
+        (before.filter.mean[OTHERS + 1], before.filter.mean[OTHERS + 2]) = (0.05, hang.signum() * 0.05);
+        let by = moved(&before, &committed(before));
+        let (ug, us) = (0.03, 6e-3);
+        let ud = &before.filter.ud;
+        let (gg, ss) = (ud.variance(OTHERS + 1) * ug * ug, ud.variance(OTHERS + 2) * us * us);
+        let gs = ud.covariance(OTHERS + 1, OTHERS + 2) * ug * us;
+        let angle = 0.5 * f64::atan2(2.0 * gs, gg - ss);
+        let (mut g, mut k) = (0.0, 0.0);
+        let mut told = 0;
+        for (x, y) in [(angle.cos(), angle.sin()), (-angle.sin(), angle.cos())] {
+            let (along, variance) =
+                (x * 0.05 * ug + y * hang.signum() * 0.05 * us, x * x * gg + 2.0 * x * y * gs + y * y * ss);
+            if along.abs() > 3.0 * variance.sqrt() {
+                (g, k, told) = (g + x * along, k + y * along, told + 1);
+            }
         }
+        assert_eq!(told, 1, "one of two directions");
+        near(by[OTHERS + 1], g / ug, 1e-12);
+        near(by[OTHERS + 2], k / us, 1e-12);
     }
-    assert_eq!(told, 1, "one of two directions");
-    near(by[OTHERS + 1], g / ug, 1e-12);
-    near(by[OTHERS + 2], k / us, 1e-12);
 }
 
 #[test]
@@ -157,9 +165,10 @@ fn each_stage_commits_what_it_may_and_forgets_as_it_should() {
             let mut before = due(stage);
             before.filter.ud = Ud::diagonal(0.01);
             before.schedule.angle_used = used;
-            before.schedule.before_rest = 4;
+            (before.schedule.before_rest, before.schedule.uses_of_symmetry) = (4, 7);
             let after = committed(before);
             assert_eq!(after.schedule.before_rest, 0, "the stages go on from here");
+            assert_eq!(after.schedule.uses_of_symmetry, 7, "what a record says was used stays so");
             for p in P::ALL.into_iter().take(OTHERS) {
                 let untold = matches!(p, P::ForceScale | P::ForceRotation | P::Rate) && used < 250;
                 let moved = !untold && (stage > 0 || coarse.contains(&p));
@@ -233,6 +242,17 @@ fn a_commit_of_the_last_stage_is_on_trial_and_taken_back_as_a_whole() {
     assert_eq!((back.taken_back, back.trial, back.score), (1, [0.0; N], 0.0));
     assert_eq!((back.schedule.commit, back.schedule.settle, back.schedule.stage), (Commit::None, 37, 4));
     assert!(back.filter.ud == after.filter.ud);
+}
+
+/// What stands where the commit was may be no device any more: then nothing is taken back, of the mean neither.
+#[test]
+fn a_commit_that_leads_back_to_no_device_stays() {
+    let mut before = due(4);
+    (before.schedule.commit, before.score) = (Commit::Back, -21.0);
+    before.trial = unit(P::OffsetX, 13.0);
+    let after = committed(before);
+    assert_eq!((after.correction, after.filter.mean), (before.correction, before.filter.mean));
+    assert_eq!((after.trial, after.taken_back, after.schedule.stage), ([0.0; N], 0, 4));
 }
 
 #[test]
@@ -442,6 +462,9 @@ fn a_record_keeps_what_is_in_force_what_is_known_of_the_detection_and_no_more() 
         assert_eq!(back.correction, s.correction);
         assert_eq!((back.schedule.stage, back.schedule.uses_of_symmetry), (3, 0x1234));
         assert!(!back.schedule.cold, "what it knows of the detection is kept");
+        let known = calibrator().restore(&c.save(&State { filter: told(), ..s })).expect("whole");
+        let status = c.status(&known);
+        assert!(status.detection_known && !status.detection_followed, "known from then, not told since");
         assert_eq!(back.schedule.angle_used, if scaled == 1 { 250 } else { 0 });
         assert_eq!((back.filter.mean, back.schedule.settle), ([0.0; N], 50));
         for i in 0..N {

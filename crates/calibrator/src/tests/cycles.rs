@@ -1,7 +1,7 @@
 //! The filter's cycle: slice by slice it does what a dense filter does at once.
 
 use super::*;
-use crate::cycle::{Doubt, MEASURE, OPEN};
+use crate::cycle::{Doubt, FIRST_MEASURE, MEASURE, OPEN};
 use crate::parameters::{DETECTION, OTHERS, Parameter as P, dot};
 use crate::regressors::{CHANNELS, turned};
 use crate::state::{Commit, State};
@@ -184,6 +184,14 @@ fn a_channel_that_is_refused_for_a_second_begins_anew() {
             let anew = if after == 0 { ([0.0; N], 0.0) } else { (before.filter.shown[c], 1e3) };
             assert_eq!((s.filter.shown[c], s.filter.seen[c]), anew, "{held}");
         }
+        // in a row: one that is taken ends it
+        let mut s = busy();
+        (s.schedule.hold[c], s.filter.seen[c]) = (24, 0.0);
+        s.filter.shown[c] = [0.0; N];
+        for k in 0..=OPEN {
+            calibrator().measure(&mut s, c, k);
+        }
+        assert_eq!((s.schedule.accept, s.schedule.hold[c]), (true, 0));
     }
 }
 
@@ -245,6 +253,48 @@ fn a_cycle_that_is_not_whole_is_not_the_one_before() {
         calibrator().work(&mut s);
     }
     assert_eq!((s.filter.mean, s.filter.shown, s.schedule.fresh), (before.filter.mean, before.filter.shown, 10));
+}
+
+/// A channel that begins anew leaves the others as they are.
+#[test]
+fn a_channel_begins_anew_by_itself() {
+    for c in 0..CHANNELS {
+        let mut s = busy();
+        s.filter.seen = [1.0, 2.0, 3.0];
+        let before = s.filter;
+        s.filter.restart(c);
+        for other in 0..CHANNELS {
+            let kept = if other == c { ([0.0; N], 0.0) } else { (before.shown[other], before.seen[other]) };
+            assert_eq!((s.filter.shown[other], s.filter.seen[other]), kept, "{c} {other}");
+        }
+    }
+}
+
+/// In slices, what is doubted of the precession is what is doubted at once.
+#[test]
+fn the_doubt_of_a_cycle_is_that_of_force_scale_and_rate() {
+    let mut s = busy();
+    s.filter.ud = crate::tests::commits::correlated(0.04);
+    // two slices a step; the first two close the cycle
+    for step in 1..=FIRST_MEASURE / 2 {
+        s.step = step;
+        calibrator().work(&mut s);
+    }
+    assert_ne!(Doubt::of(&s).force_scale, Doubt::of(&s).rate);
+    near(s.schedule.doubt.force_scale, Doubt::of(&s).force_scale, 1e-15);
+    near(s.schedule.doubt.rate, Doubt::of(&s).rate, 1e-15);
+}
+
+/// After a gap nothing says how far the pattern turned, and what it turned by before is past.
+#[test]
+fn a_cycle_after_none_shows_no_turn() {
+    for whole in [true, false] {
+        let mut s = busy();
+        (s.schedule.turn, s.before.whole) = (0.3, whole);
+        calibrator().integrate_all(&mut s, 1);
+        assert_eq!(s.schedule.turn == 0.0, !whole, "{whole}");
+        assert!(s.schedule.turn != 0.3, "{whole}");
+    }
 }
 
 #[test]

@@ -104,6 +104,45 @@ fn a_pass_begins_with_the_noise_of_the_one_before_and_with_nothing_else() {
     assert_eq!((looking.state.filter, looking.state.schedule.stage), (filter, 2));
 }
 
+/// Between the end of one pass and the beginning of the next the pattern did not turn.
+#[test]
+fn another_pass_does_not_go_on_where_the_last_one_ended() {
+    let (mut again, mut first) = (replay(), replay());
+    rows(&mut again, 0.3, 0.0, 800);
+    assert!(again.state.before.whole);
+    for replay in [&mut again, &mut first] {
+        replay.begin(1, Learning::On);
+        rows(replay, 1.2, 0.0, 80);
+        assert_eq!((replay.state.schedule.turn, replay.state.schedule.swept), (0.0, 0.0));
+    }
+}
+
+/// The direction of a cycle is the mean over its rows, of the first as of those that follow.
+#[test]
+fn the_direction_of_a_cycle_is_the_mean_of_its_rows() {
+    let mut replay = replay();
+    let (theta, rate) = (0.3, 2.0);
+    rows(&mut replay, theta, rate, 240);
+    // rows 160 to 239
+    let mean = theta + rate * 5e-4 * 199.5;
+    near(replay.state.sample.cos, mean.cos(), 1e-9);
+    near(replay.state.sample.sin, mean.sin(), 1e-9);
+}
+
+/// What is doubted of the precession is what the last pass left, and not the first.
+#[test]
+fn each_pass_says_anew_how_well_the_precession_is_known() {
+    let mut replay = replay();
+    for variance in [0.01, 0.0001] {
+        replay.state.filter.ud = Ud::diagonal(variance);
+        replay.state.schedule.angle_used = 250;
+        replay.relinearise().expect("of a device");
+        let doubt = replay.doubt.expect("a known precession was seen");
+        near(doubt.force_scale, variance.sqrt() * P::ForceScale.expected::<f64>(), 1e-12);
+        near(doubt.rate, variance.sqrt() * P::Rate.expected::<f64>(), 1e-12);
+    }
+}
+
 #[test]
 fn a_pass_that_learns_nothing_tells_what_it_sees_and_believes_what_it_did() {
     for learning in [Learning::On, Learning::Off] {

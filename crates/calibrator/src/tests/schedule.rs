@@ -139,6 +139,11 @@ fn a_commit_is_due_after_the_seconds_of_its_stage() {
         // what predicts far worse than before is taken back at once
         assert_eq!((due(3, -20.0).1, due(3, -20.001).1), (Commit::None, Commit::Back));
     }
+    // cycles in which loops settle are none of it
+    let mut s = busy();
+    (s.schedule.stage, s.schedule.used, s.schedule.fresh, s.score) = (0, 250, 0, -21.0);
+    c.plan(&mut s);
+    assert_eq!((s.schedule.used, s.schedule.commit), (250, Commit::None));
     // while it turns, every twenty seconds, and every ten where it has swept half a turn
     for (stage, swept, seconds) in [(3, 9.0, 20), (4, 3.1, 20), (4, 3.2, 10)] {
         let due = |used: u32| {

@@ -3,11 +3,13 @@
 use cvg_model::Float;
 use kani::Arbitrary;
 
+use crate::allocation::Channels;
 use crate::{ActuationCompensation, Allocation, OrbitCommands, Status};
 
 /// Any allocation that can be built, with any compensation, and its limit.
 pub(super) fn any_allocation<T: Float + Arbitrary>() -> (Allocation<T>, T) {
-    let inverse = ActuationCompensation { xx: kani::any(), xy: kani::any(), yx: kani::any(), yy: kani::any() };
+    let channels = || Channels { xx: kani::any(), xy: kani::any(), yx: kani::any(), yy: kani::any() };
+    let inverse = ActuationCompensation { same: channels(), quarter: channels() };
     let limit_v = kani::any();
     // precondition: a configuration that `new` accepts
     match Allocation::new(if kani::any() { Some(inverse) } else { None }, limit_v) {

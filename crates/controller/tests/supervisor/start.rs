@@ -80,6 +80,14 @@ fn a_sweep_longer_than_can_be_counted_lasts_as_long_as_can_be_counted() {
     let supervisor = Supervisor::<f64>::new(&long).expect("valid");
     assert!(matches!(supervisor.step(&mut state, &well(), None), Orders::Sweep { .. }));
     assert_eq!((supervisor.step(&mut state, &well(), None), state.mode), (Orders::Rest, Mode::Listen));
+    // beyond what half of the count can hold it stays at the upper end of the band
+    for windows in [(1 << 31) - 2, (1 << 31) - 1, 1 << 31, 3_000_000_000] {
+        let mut state = SupervisorState { sweeps: 8, windows, ..in_mode(Mode::Sweep, 0) };
+        let Orders::Sweep { correction_rad_s, .. } = supervisor.step(&mut state, &well(), None) else {
+            panic!("{windows}: it sweeps")
+        };
+        assert!((correction_rad_s / long.band_rad_s - 1.0).abs() < 1e-8, "{windows}: {correction_rad_s}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The demodulator's window.
 
-use cvg_model::Float;
+use cvg_model::{Envelope, Float};
 use kani::Arbitrary;
 
 use crate::{Demodulator, Phasor, Window};
@@ -57,6 +57,51 @@ pub fn proof_samples_are_admitted_within_the_range_f32() {
 #[kani::should_panic]
 pub fn twin_samples_are_admitted_within_the_range_f32() {
     samples_are_admitted_within_the_range(0.5_f32);
+}
+
+fn an_envelope_is_within_eight_ranges<T: Float + Arbitrary>(share: T) {
+    let (demodulator, range) = any_demodulator::<T>();
+    let e = Envelope::new(kani::any(), kani::any(), kani::any(), kani::any());
+    let plausible = demodulator.plausible(e);
+    kani::cover!(plausible.is_none() && e.x_s.is_finite() && e.y_s.is_finite(), "no number, or far out of range");
+    if let Some(e) = plausible {
+        kani::cover!(e.y_c < T::zero() && e.x_s > T::one(), "a vibration");
+        let most = share * T::ratio(8, 1) * range;
+        assert!(e.x_c.magnitude() < most && e.x_s.magnitude() < most);
+        assert!(e.y_c.magnitude() < most && e.y_s.magnitude() < most);
+    }
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// Each part of an envelope that [`Demodulator::plausible`] lets out is a number below eight times the converter's range, for any
+/// bits that the fit of a window makes: converters of ±2.5 V.
+#[kani::proof]
+pub fn proof_an_envelope_is_within_eight_ranges_f32() {
+    an_envelope_is_within_eight_ranges(1.0_f32);
+}
+
+/// Half of that is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_an_envelope_is_within_eight_ranges_f32() {
+    an_envelope_is_within_eight_ranges(0.5_f32);
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// Each part of an envelope that [`Demodulator::plausible`] lets out is a number below eight times the converter's range, for any
+/// bits that the fit of a window makes: converters of ±2.5 V.
+#[kani::proof]
+pub fn proof_an_envelope_is_within_eight_ranges_f64() {
+    an_envelope_is_within_eight_ranges(1.0_f64);
+}
+
+/// Half of that is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_an_envelope_is_within_eight_ranges_f64() {
+    an_envelope_is_within_eight_ranges(0.5_f64);
 }
 
 fn a_window_ends<T: Float + Arbitrary>(fewer: u32) {

@@ -24,8 +24,11 @@ const LATE: &[(EffectId, Values<f64>)] = &[
     (EffectId::HarmonicN, [2.0, 1e-10, 0.0, 3.0]),
 ];
 const CLIPPED: &[(EffectId, Values<f64>)] = &[(EffectId::DetectionSaturation, [0.9, 0.0, 0.0, 0.0])];
-const DRIVES: &[(EffectId, Values<f64>)] =
-    &[(EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]), (EffectId::ActuationSkew, [0.02, 0.0, 0.0, 0.0])];
+const DRIVES: &[(EffectId, Values<f64>)] = &[
+    (EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]),
+    (EffectId::ActuationSkew, [0.02, 0.0, 0.0, 0.0]),
+    (EffectId::ActuationPhase, [0.03, 0.0, 0.0, 0.0]),
+];
 
 /// Settings of which no two that belong to different parts are the same number.
 fn settings(which: usize) -> Settings<'static> {

@@ -82,6 +82,18 @@ fn a_jump_and_a_fault_are_doubted<T: Float>() {
     assert!(bench.fault(1000, |v| v).is_some() && bench.status.half_turns_lost, "a fault");
 }
 
+fn a_direction_that_is_lost_between_operation_and_operation_is_doubted<T: Float>() {
+    // a phase that is far off is locked anew, and the pattern has no direction for a while: who knows how it turned
+    let mut bench = Bench::<T>::running(0.2, 0.0);
+    bench.state.supervisor.mode = Mode::Lock;
+    bench.state.supervisor.windows = 5;
+    bench.windows(1);
+    assert!(!bench.status.half_turns_lost && bench.status.mode == Mode::Lock);
+    bench.amplitude_v = 0.0;
+    bench.windows(1);
+    assert!(bench.status.half_turns_lost, "{:?}", bench.state.supervisor);
+}
+
 fn a_start_is_no_loss<T: Float>() {
     let bench = Bench::<T>::running(0.2, 0.0);
     assert_eq!(bench.state.continuity, Continuity { unseen: 0, counting: true, lost: false });
@@ -123,6 +135,7 @@ in_both_precisions! {
     as_many_windows_as_a_pattern_needs_for_45_degrees_are_doubted too_long_without_a_window_is_doubted;
     windows_that_nobody_saw_are_as_many_after_an_acknowledgement an_acknowledgement_shows_no_window;
     a_pattern_that_jumps_and_one_that_falls_silent_are_doubted a_jump_and_a_fault_are_doubted;
+    a_direction_that_is_lost_while_it_locks_is_doubted a_direction_that_is_lost_between_operation_and_operation_is_doubted;
     a_start_and_another_wish_lose_nothing a_start_is_no_loss;
     what_is_acknowledged_without_a_direction_is_not_lost_with_the_first at_rest_there_is_nothing_to_lose;
 }

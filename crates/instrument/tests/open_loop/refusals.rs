@@ -1,5 +1,7 @@
 //! What is not compensated, and what comes of a compensation without an answer.
 
+use core::f64::consts::TAU;
+
 use cvg_instrument::{Instrument, Mode, Settings};
 use cvg_model::effects::{EffectId, Stage, Values};
 
@@ -51,6 +53,17 @@ fn settings_are_taken_up_to_their_edges_and_refused_beyond_by_name() {
     for (name, change, taken, refused) in edges {
         assert_eq!(new(change, taken), (None, None), "{name} = {taken}");
         assert_eq!(new(change, refused), (Some(name), Some(name)), "{name} = {refused}");
+    }
+    // half a sample of the hold, and delays in which 1.1 times the band turns by a radian
+    for of_readout in [0.0, 1e-5] {
+        let wide = |beyond: f64| {
+            let band = 0.12;
+            let whole = 1.0 / (1.1 * TAU * Settings::default().carrier_hz * band);
+            let drive_delay_s = whole * (1.0 + beyond) - 0.5 / Settings::default().sample_hz - of_readout;
+            let s = Settings { band, window: 10, readout_delay_s: of_readout, drive_delay_s, ..Settings::default() };
+            Instrument::<f32>::new(&s).err().map(|e| e.parameter)
+        };
+        assert_eq!((wide(-1e-12), wide(1e-12)), (None, Some("drive_delay_s")), "{of_readout}");
     }
     let positive: [(&str, Change); 6] = [
         ("carrier_hz", |s, v| s.carrier_hz = v),

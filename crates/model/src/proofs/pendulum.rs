@@ -40,6 +40,30 @@ pub fn twin_energy_bounds_the_orientation_f32() {
     energy_bounds_the_orientation(0.5_f32);
 }
 
+fn a_finite_energy_is_of_numbers<T: Float + Arbitrary>(claimed: impl Fn(T) -> bool) {
+    let e = any_envelope::<T>();
+    kani::cover!(e.x_c.is_finite() && e.y_s.is_finite() && !e.pendulum().e.is_finite(), "too large");
+    if e.pendulum().e.is_finite() {
+        kani::cover!(e.x_s < -T::one(), "a vibration");
+        assert!(claimed(e.x_c) && claimed(e.x_s) && claimed(e.y_c) && claimed(e.y_s));
+    }
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// Where the energy of [`Envelope::pendulum`] is finite, so is each part of the envelope, for any bits of it.
+#[kani::proof]
+pub fn proof_a_finite_energy_is_of_numbers_f32() {
+    a_finite_energy_is_of_numbers(|v: f32| v.is_finite());
+}
+
+/// That each part is below 2⁶⁰ is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_a_finite_energy_is_of_numbers_f32() {
+    a_finite_energy_is_of_numbers(|v: f32| v.magnitude() < 1.152_921_5e18);
+}
+
 /// The same number, or both none.
 fn same<T: Float>(a: T, b: T) -> bool {
     a == b || (is_nan(a) && is_nan(b))

@@ -82,8 +82,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "actuation is undone by the transposed matrix in one phase",
         "controller/src/allocation.rs",
-        "y_s: self.yx * f.x_s + self.yy * f.y_s,",
-        "y_s: self.xy * f.x_s + self.yy * f.y_s,",
+        "y_s: same.of_y(f.x_s, f.y_s) -",
+        "y_s: same.xy * f.x_s + same.yy * f.y_s -",
         FORCES,
     ),
     fault(
@@ -399,8 +399,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a skew of the drives is undone with its own sign",
         "controller/src/allocation.rs",
-        "yx: -of_x.y_c / determinant,",
-        "yx: of_x.y_c / determinant,",
+        "yx: -yx.0,",
+        "yx: yx.0,",
         FORCES,
     ),
     fault(
@@ -413,8 +413,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a compensation of the drives is transposed",
         "controller/src/allocation.rs",
-        "            xx: of_y.y_c / determinant,",
-        "            xx: of_x.x_c / determinant,",
+        "(over(y_of_y), over(x_of_x), over(x_of_y), over(y_of_x))",
+        "(over(x_of_x), over(y_of_y), over(x_of_y), over(y_of_x))",
         FORCES,
     ),
     fault(

@@ -53,8 +53,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the second channel may be far out of range",
         "estimator/src/demodulator.rs",
-        "x_c.magnitude() + x_s.magnitude() + y_c.magnitude() + y_s.magnitude()",
-        "x_c.magnitude() + x_s.magnitude()",
+        "e.x_c.magnitude() + e.x_s.magnitude() + e.y_c.magnitude() + e.y_s.magnitude()",
+        "e.x_c.magnitude() + e.x_s.magnitude()",
         DEMODULATOR,
     ),
     fault(
