@@ -27,7 +27,8 @@ pub struct OrbitCommands<T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationCompensation<T> {
     pub(crate) same: Channels<T>,
-    pub(crate) quarter: Channels<T>,
+    /// none where the drives have no phase: most
+    pub(crate) quarter: Option<Channels<T>>,
 }
 
 /// A 2×2 matrix from (x, y) to (x, y).
@@ -41,13 +42,13 @@ pub(crate) struct Channels<T> {
 
 impl<T: Float> Channels<T> {
     #[inline(always)]
-    fn of_x(&self, x: T, y: T) -> T {
-        self.xx * x + self.xy * y
-    }
-
-    #[inline(always)]
-    fn of_y(&self, x: T, y: T) -> T {
-        self.yx * x + self.yy * y
+    fn apply(&self, f: &AxisForces<T>) -> AxisForces<T> {
+        AxisForces {
+            x_c: self.xx * f.x_c + self.xy * f.y_c,
+            x_s: self.xx * f.x_s + self.xy * f.y_s,
+            y_c: self.yx * f.x_c + self.yy * f.y_c,
+            y_s: self.yx * f.x_s + self.yy * f.y_s,
+        }
     }
 }
 
@@ -82,9 +83,11 @@ impl<T: Float> ActuationCompensation<T> {
         }
         let over = |z: (T, T)| times(z, (re / size_2, -im / size_2));
         let (xx, yy, xy, yx) = (over(y_of_y), over(x_of_x), over(x_of_y), over(y_of_x));
+        let quarter = Channels { xx: -xx.1, xy: xy.1, yx: yx.1, yy: -yy.1 };
+        let is_none = [quarter.xx, quarter.xy, quarter.yx, quarter.yy].iter().all(|v| *v == zero);
         Ok(Self {
             same: Channels { xx: xx.0, xy: -xy.0, yx: -yx.0, yy: yy.0 },
-            quarter: Channels { xx: -xx.1, xy: xy.1, yx: yx.1, yy: -yy.1 },
+            quarter: if is_none { None } else { Some(quarter) },
         })
     }
 
@@ -92,12 +95,18 @@ impl<T: Float> ActuationCompensation<T> {
     //# The compensated allocation MUST make the forces along the orbit that were commanded.
     #[inline]
     fn apply(&self, f: AxisForces<T>) -> AxisForces<T> {
-        let (same, quarter) = (&self.same, &self.quarter);
-        AxisForces {
-            x_c: same.of_x(f.x_c, f.y_c) + quarter.of_x(f.x_s, f.y_s),
-            x_s: same.of_x(f.x_s, f.y_s) - quarter.of_x(f.x_c, f.y_c),
-            y_c: same.of_y(f.x_c, f.y_c) + quarter.of_y(f.x_s, f.y_s),
-            y_s: same.of_y(f.x_s, f.y_s) - quarter.of_y(f.x_c, f.y_c),
+        let same = self.same.apply(&f);
+        match &self.quarter {
+            None => same,
+            Some(quarter) => {
+                let other = quarter.apply(&f);
+                AxisForces {
+                    x_c: same.x_c + other.x_s,
+                    x_s: same.x_s - other.x_c,
+                    y_c: same.y_c + other.y_s,
+                    y_s: same.y_s - other.y_c,
+                }
+            }
         }
     }
 }

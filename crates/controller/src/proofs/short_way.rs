@@ -137,9 +137,11 @@ pub fn twin_forces_are_the_same_f32() {
 
 /// `answers(a, b)`: what is claimed of a force that the short way gives and of the one that the limits leave.
 fn limits_leave_what_is_within<T: Float + Arbitrary>(answers: impl Fn(T, T) -> bool) {
-    let (allocation, _) = any_allocation::<T>();
+    let (allocation, limit_v) = any_allocation::<T>();
     let f = AxisForces { x_c: kani::any(), x_s: kani::any(), y_c: kani::any(), y_s: kani::any() };
     let long = allocation.limited(f);
+    let v = &long.volts;
+    assert!(v.x_c.within(limit_v) && v.x_s.within(limit_v) && v.y_c.within(limit_v) && v.y_s.within(limit_v));
     kani::cover!(!allocation.fits(&f) && long.volts.x_c == T::zero(), "the long way");
     if allocation.fits(&f) {
         kani::cover!(f.y_c > T::zero() && f.x_s < T::zero(), "the short way");
@@ -151,7 +153,7 @@ fn limits_leave_what_is_within<T: Float + Arbitrary>(answers: impl Fn(T, T) -> b
 //= specs/dsp.md#short-way
 //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
 /// Forces that [`Allocation::fits`] lets [`Allocation::step_within`] give, [`Allocation::limited`] leaves as they are, to the last
-/// bit: for any bits of forces and any limit.
+/// bit, and any others it leaves within the limit: for any bits of forces and any limit.
 #[kani::proof]
 pub fn proof_limits_leave_what_is_within_f32() {
     limits_leave_what_is_within(|a: f32, b| same(a, b));

@@ -82,8 +82,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "actuation is undone by the transposed matrix in one phase",
         "controller/src/allocation.rs",
-        "y_s: same.of_y(f.x_s, f.y_s) -",
-        "y_s: same.xy * f.x_s + same.yy * f.y_s -",
+        "y_s: self.yx * f.x_s + self.yy * f.y_s,",
+        "y_s: self.xy * f.x_s + self.yy * f.y_s,",
         FORCES,
     ),
     fault(

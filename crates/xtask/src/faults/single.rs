@@ -90,8 +90,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision the inverse of Y's quadrature is transposed",
         "controller/src/allocation.rs",
-        "y_s: same.of_y(f.x_s, f.y_s) -",
-        "y_s: (if core::mem::size_of::<T>() == 4 { same.xy } else { same.yx }) * f.x_s + same.yy * f.y_s -",
+        "y_s: self.yx * f.x_s + self.yy * f.y_s,",
+        "y_s: (if core::mem::size_of::<T>() == 4 { self.xy } else { self.yx }) * f.x_s + self.yy * f.y_s,",
         CONTROLLER,
     ),
     fault(

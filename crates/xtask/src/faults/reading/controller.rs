@@ -291,15 +291,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a phase of the drives is left in",
         "controller/src/allocation.rs",
-        "+ quarter.of_x(f.x_s, f.y_s),",
-        "+ quarter.of_x(f.x_s, f.y_s) * T::zero(),",
+        "x_c: same.x_c + other.x_s,",
+        "x_c: same.x_c,",
         FORCES,
     ),
     fault(
         "a phase of the drives is undone the other way in Y",
         "controller/src/allocation.rs",
-        "y_s: same.of_y(f.x_s, f.y_s) - quarter",
-        "y_s: same.of_y(f.x_s, f.y_s) + quarter",
+        "y_s: same.y_s - other.y_c,",
+        "y_s: same.y_s + other.y_c,",
         FORCES,
     ),
     fault(

@@ -74,8 +74,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the quadrature of X is left in the drives",
         "controller/src/allocation.rs",
-        "x_s: same.of_x(f.x_s, f.y_s) -",
-        "x_s: f.x_s + same.xy * f.y_s -",
+        "x_s: self.xx * f.x_s + self.xy * f.y_s,",
+        "x_s: f.x_s + self.xy * f.y_s,",
         FORCES,
     ),
     fault(
