@@ -86,6 +86,37 @@ fn seventeen_stations_are_enough_for_offset_gain_and_skew() {
 
 /// A modulator at every tenth degree, tested at those between. Half the spacing is the highest line that 36 stations see,
 /// and they see it at one phase only: at the stations between, the other phase is all that there would be.
+/// A Hall pair at 17 stations of a turn, its magnet mounted with these offsets.
+fn mounted(offset: [f64; 2], role: Role, seed: u64) -> Run {
+    let angles: Vec<f64> = (0..17).map(|i| 22.5 * f64::from(i)).collect();
+    let mut noise = Noise::new(seed);
+    let mut read = |scale: f64, offset: f64, signal: f64| scale * signal + offset + 1e-3 * noise.sample();
+    let (x, y) = angles
+        .iter()
+        .map(|d| {
+            let (sin, cos) = d.to_radians().sin_cos();
+            (read(1.0, offset[0], cos), read(1.06, offset[1], sin))
+        })
+        .unzip();
+    read_at(angles, x, y, role)
+}
+
+#[test]
+fn a_sensor_that_is_mounted_anew_is_still_one_and_the_difference_is_said() {
+    // the centres are 0.02 to 0.04 of the amplitude apart, and 0.1 to 0.14 off
+    let centres = [[0.10, -0.06], [0.07, -0.07], [0.11, -0.09], [0.13, -0.05]];
+    for (case, fitted) in [1, 2, 3].into_iter().enumerate() {
+        let runs = (0..4).map(|i| mounted(centres[i], role(i >= fitted), 40 + 10 * case as u64 + i as u64)).collect();
+        let i = identified(sensor(runs));
+        assert_eq!(i.report.status, Status::Answered);
+        let raw = i.report.heldout.raw.unwrap().rms_deg;
+        assert!(raw > 4.0 && held_out(&i) < raw / 3.0, "{raw}, {}", held_out(&i));
+        let ratio = i.report.detection_gain_ratio.unwrap();
+        assert!((ratio.value - 1.06).abs() < ratio.half_width() && ratio.half_width() < 0.05, "{ratio:?}");
+        assert!(i.report.warnings.iter().any(|w| w.contains("mounted anew")), "{:?}", i.report.warnings);
+    }
+}
+
 #[test]
 fn a_line_that_the_stations_see_at_one_phase_does_not_swing_between_them() {
     let at = |first: f64, role, seed| {

@@ -19,6 +19,9 @@ const ENOUGH_ROWS: usize = 1000;
 const SAME_CURVE: f64 = 0.02;
 /// … or by less than so many times what its own ellipse leaves.
 const SAME_LEFT: f64 = 5.0;
+/// A sensor that was mounted anew, or drifted, draws another ellipse. It is still believed to be one where the ellipse of
+/// either run takes out at least half of what the other is off a circle by: engineering choice.
+const LEFT_WHEN_MOUNTED_ANEW: f64 = 0.5;
 /// Amplitudes of one sensor in one unit are within this factor: a thousand is the next unit.
 const SAME_AMPLITUDE: f64 = 30.0;
 /// A channel stands still where it moves by less than this share of the other.
@@ -29,7 +32,18 @@ struct Own {
     run: SensorRun,
     readout: Readout,
     amplitude: f64,
+    /// how far the radius is off with its own ellipse undone, and as recorded
     left: f64,
+    as_recorded: f64,
+}
+
+/// How two runs go together.
+enum Together {
+    /// they draw one ellipse
+    Alike,
+    /// they do not, and the ellipse of either makes the other rounder
+    MountedAnew,
+    No,
 }
 
 impl Own {
@@ -40,13 +54,24 @@ impl Own {
             return None;
         }
         let (left, amplitude) = (off(&readout, &run), readout.amplitude);
-        Some(Self { run, readout, amplitude, left })
+        let as_recorded = off(&Readout::plain(), &run);
+        Some(Self { run, readout, amplitude, left, as_recorded })
     }
 
-    /// How far the radius of either is off with the ellipse of the other undone, and whether that is one sensor's.
-    fn beside(&self, other: &Self) -> (f64, bool) {
-        let across = off(&self.readout, &other.run).max(off(&other.readout, &self.run));
-        (across, across <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left)))
+    /// How far the radius of either is off with the ellipse of the other undone.
+    fn across(&self, other: &Self) -> f64 {
+        off(&self.readout, &other.run).max(off(&other.readout, &self.run))
+    }
+
+    fn together(&self, other: &Self) -> Together {
+        if self.times(other).ln().abs() > SAME_AMPLITUDE.ln() {
+            return Together::No;
+        }
+        if self.across(other) <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left)) {
+            return Together::Alike;
+        }
+        let rounder = |a: &Self, b: &Self| off(&a.readout, &b.run) <= LEFT_WHEN_MOUNTED_ANEW * b.as_recorded;
+        if rounder(self, other) && rounder(other, self) { Together::MountedAnew } else { Together::No }
     }
 
     fn times(&self, other: &Self) -> f64 {
@@ -54,7 +79,23 @@ impl Own {
     }
 
     fn agrees(&self, other: &Self) -> bool {
-        self.times(other).ln().abs() <= SAME_AMPLITUDE.ln() && self.beside(other).1
+        !matches!(self.together(other), Together::No)
+    }
+
+    /// What has to be said of a run that draws another ellipse and is believed.
+    fn mounted_anew(&self, other: &Self) -> Option<String> {
+        matches!(self.together(other), Together::MountedAnew).then(|| {
+            format!(
+                "{}: its channels do not quite draw what those of {} do, as of a sensor that was mounted anew or drifted: the \
+                 radius is off by {:.2} % as recorded, by {:.2} % with the ellipse of the other undone, and by {:.2} % with \
+                 its own; one calibration for both leaves the difference",
+                self.run.name,
+                other.run.name,
+                100.0 * self.as_recorded,
+                100.0 * off(&other.readout, &self.run),
+                100.0 * self.left
+            )
+        })
     }
 
     /// Why it does not agree with another.
@@ -70,7 +111,7 @@ impl Own {
             "its channels do not draw what those of {} do: with the ellipse of the other undone the radius is off by {:.2} %, \
              with its own by {:.2} %",
             other.run.name,
-            100.0 * self.beside(other).0,
+            100.0 * self.across(other),
             100.0 * self.left
         )
     }
@@ -112,6 +153,7 @@ pub(super) fn of_one_sensor(runs: Vec<SensorRun>, warnings: &mut Vec<String>) ->
     let said =
         runs.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?)));
     warnings.extend(said);
+    warnings.extend(usual.iter().flat_map(|usual| told.iter().filter_map(|own| own.mounted_anew(usual))));
     Ok(runs.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
 }
 
