@@ -8,53 +8,8 @@ use crate::correction::{Correction, FARTHEST};
 use crate::parameters::{N, Parameter, get};
 use crate::{Calibrator, Settings};
 
-fn what_is_in_force_is_bounded<T: Float + Arbitrary>(share: f64) {
-    let mut known = [T::zero(); N];
-    let mut y_of_y = Complex::real(T::one());
-    let mut y_of_x = Complex::real(T::zero());
-    // budget: one number is any, the others are a perfect instrument's; an inverse of any matrix takes minutes
-    let at: u8 = kani::any();
-    let value = kani::any();
-    match at {
-        0 => y_of_y.re = value,
-        1 => y_of_y.im = value,
-        2 => y_of_x.re = value,
-        _ => {
-            if let Some(slot) = known.get_mut(usize::from(at - 3)) {
-                *slot = value;
-            }
-        }
-    }
-    let made = Correction::of(known, y_of_y, y_of_x, Matrix::identity());
-    kani::cover!(made.is_none(), "refused");
-    if let Some(c) = made {
-        kani::cover!(c.known.iter().any(|v| *v < T::zero()), "a value below none");
-        let within = |p: &Parameter| get(&c.known, *p).magnitude() <= p.expected::<T>() * T::from_f64(FARTHEST * share);
-        assert!(Parameter::ALL.iter().all(within));
-        let near = |z: Complex<T>, re: T, reach: f64| {
-            (z.re - re).magnitude() <= T::from_f64(reach * share) && z.im.magnitude() <= T::from_f64(reach * share)
-        };
-        let (zero, one) = (T::zero(), T::one());
-        assert!(near(c.y_of_y, one, 0.36) && near(c.y_of_x, zero, 0.12));
-    }
-}
-
-//= specs/self-calibration.md#bounded
-//# Every value in force MUST be finite and one that a device can have for every input.
-/// Whatever the bits that [`Correction::of`] is given, it refuses them, or every value lies within what a device can have.
-#[kani::proof]
-#[kani::unwind(20)]
-pub fn proof_what_is_in_force_is_bounded_f32() {
-    what_is_in_force_is_bounded::<f32>(1.0);
-}
-
-/// Half of that is claimed.
-#[kani::proof]
-#[kani::unwind(20)]
-#[kani::should_panic]
-pub fn twin_what_is_in_force_is_bounded_f32() {
-    what_is_in_force_is_bounded::<f32>(0.5);
-}
+// Given up: the same of what `Correction::of` itself returns, one number free (106 s: its inverse of a matrix). That it asks for
+// the checks below is tested: calibrator/src/tests/commits.rs.
 
 /// A correction of any numbers, as nobody makes one, and whether what makes one lets it into force.
 fn any_correction<T: Float + Arbitrary>() -> (Correction<T>, bool) {
