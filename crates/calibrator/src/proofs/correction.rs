@@ -5,11 +5,11 @@ use kani::Arbitrary;
 
 use crate::complex::{Complex, Matrix};
 use crate::correction::{Correction, FARTHEST};
-use crate::parameters::{N, Parameter, get};
+use crate::parameters::{N, Parameter};
 use crate::{Calibrator, Settings};
 
 // Given up: the same of what `Correction::of` itself returns, one number free (106 s: its inverse of a matrix). That it asks for
-// the checks below is tested: calibrator/src/tests/commits.rs.
+// the checks below is tested for each number: calibrator/src/tests/mechanics.rs.
 
 /// A correction of any numbers, as nobody makes one, and whether what makes one lets it into force.
 fn any_correction<T: Float + Arbitrary>() -> (Correction<T>, bool) {

@@ -462,6 +462,31 @@ fn what_is_no_rotation_is_what_is_known_of_the_angle_but_its_constant_rate() {
     }
 }
 
+/// What a record or a commit hands over comes into force as a whole or not at all, whichever number is the wrong one.
+#[test]
+fn a_number_that_no_device_has_keeps_the_rest_out_of_force() {
+    let made = |at: usize, value: f64| {
+        let mut numbers = [0.0; N + 12];
+        // of a perfect instrument
+        (numbers[N], numbers[N + 4], numbers[N + 10]) = (1.0, 1.0, 1.0);
+        if let Some(slot) = numbers.get_mut(at) {
+            *slot = value;
+        }
+        let mut rest = numbers.into_iter();
+        let known = core::array::from_fn(|_| rest.next().expect("a number"));
+        let mut complex = || Complex::new(rest.next().expect("re"), rest.next().expect("im"));
+        let (y_of_y, y_of_x) = (complex(), complex());
+        let drives = Matrix { xx: complex(), xy: complex(), yx: complex(), yy: complex() };
+        Correction::of(known, y_of_y, y_of_x, drives)
+    };
+    assert!(made(usize::MAX, 0.0).is_some());
+    for at in 0..N + 12 {
+        for value in [f64::NAN, f64::INFINITY, -1e6, 1e6] {
+            assert!(made(at, value).is_none(), "number {at} is {value}");
+        }
+    }
+}
+
 /// A skew of the readout has the phase of Y, one of the drives the mean of the phases of both.
 #[test]
 fn skews_in_phase_have_the_phases_of_what_they_are_skews_of() {
