@@ -206,3 +206,21 @@ impl std::io::Read for Endless {
         self.left.read(buffer)
     }
 }
+
+/// A footer with a field that no version of Parquet has: a list of two thousand million booleans, which take no byte.
+#[test]
+fn a_footer_with_a_list_of_booleans_without_end_is_refused() {
+    let sound = parquet(&standstill(10));
+    let before = sound.len() - 8;
+    let footer = u32::from_le_bytes(sound[before..before + 4].try_into().unwrap()) as usize;
+    let (head, own) = (&sound[..before - footer], &sound[before - footer..before]);
+    // a long field number, 99, of a list (9) of booleans (0xf1) as long as an i32 goes, before the fields that it has
+    let list = [0x09, 0xc6, 0x01, 0xf1, 0xff, 0xff, 0xff, 0xff, 0x07];
+    // the first field has its number in full, because it does not follow on zero any more
+    let (kind, rest) = (own[0] & 0x0f, &own[1..]);
+    assert_eq!(own[0] >> 4, 1, "the version comes first");
+    let footer = [&list[..], &[kind, 0x02], rest].concat();
+    let length = u32::try_from(footer.len()).unwrap().to_le_bytes();
+    let said = read_file(&[head, &footer, &length, b"PAR1"].concat()).expect_err("the file is refused").to_string();
+    assert!(said.contains("its footer is damaged"), "{said}");
+}

@@ -114,7 +114,8 @@ fn guarded<T>(source: &Path, read: impl FnOnce(&Path) -> Result<T, ReadError>) -
 }
 
 fn open(source: &Path) -> Result<SerializedFileReader<File>, ReadError> {
-    let file = File::open(source).map_err(|error| ReadError::io(source, error))?;
+    let mut file = File::open(source).map_err(|error| ReadError::io(source, error))?;
+    sizes::check_footer(&mut file, source)?;
     SerializedFileReader::new(file).map_err(|error| refuse(source, error.to_string()))
 }
 

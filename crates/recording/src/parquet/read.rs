@@ -37,7 +37,8 @@ pub(crate) fn read(file: File, naming: &Naming, source: &Path) -> Result<Recordi
 
 fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError> {
     let refuse = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
-    let pages = file.try_clone().map_err(|error| ReadError::io(source, error))?;
+    let mut pages = file.try_clone().map_err(|error| ReadError::io(source, error))?;
+    sizes::check_footer(&mut pages, source)?;
     let reader = SerializedFileReader::new(file).map_err(|error| refuse(error.to_string()))?;
     let descriptions = reader.metadata().file_metadata().schema_descr_ptr();
     let mut warnings = vec![];

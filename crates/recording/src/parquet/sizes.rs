@@ -14,8 +14,34 @@ use crate::memory::{self, PER_NUMBER, PER_TEXT};
 
 /// Bytes within which the header of a page ends.
 const LONGEST_HEADER: u64 = 64 << 10;
-/// Structures within structures that a header may have.
-const DEEPEST: usize = 8;
+/// Structures within structures that a header may have; a footer has ten.
+const DEEPEST: usize = 16;
+/// A structure, as Thrift numbers its types.
+const STRUCTURE: u8 = 12;
+
+/// Bytes at the end of a file: the length of its footer, and the name of the format.
+const END: u64 = 8;
+
+/// Refuses a file whose footer holds a list or a map that is no structure's of Parquet and that a decoder would go through for as
+/// long as it says it is: the decoder takes no byte for a boolean, so that four bytes are two thousand million of them.
+pub(super) fn check_footer(file: &mut File, source: &Path) -> Result<(), ReadError> {
+    let io = |error| ReadError::io(source, error);
+    let length = file.metadata().map_err(io)?.len();
+    let Some(before) = length.checked_sub(END) else { return Ok(()) };
+    let mut end = [0; END as usize];
+    file.seek(SeekFrom::Start(before)).map_err(io)?;
+    file.read_exact(&mut end).map_err(io)?;
+    let [a, b, c, d, name @ ..] = end;
+    let footer = u64::from(u32::from_le_bytes([a, b, c, d]));
+    if name != *b"PAR1" || footer > before {
+        return Ok(());
+    }
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(before - footer)).map_err(io)?;
+    file.take(footer).read_to_end(&mut bytes).map_err(io)?;
+    let read = Thrift { bytes: &bytes, at: 0 }.skip(STRUCTURE, 0);
+    read.ok_or_else(|| ReadError::Parquet { path: source.to_path_buf(), what: "its footer is damaged".into() })
+}
 
 /// Refuses columns that would take too much, and pages that contradict their columns.
 pub(super) fn check(
@@ -93,7 +119,7 @@ struct Page {
     is_dictionary: bool,
 }
 
-/// A reader of Thrift's compact protocol, as far as headers of pages need it.
+/// A reader of Thrift's compact protocol, as far as footers and headers of pages need it.
 struct Thrift<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -108,7 +134,7 @@ impl Thrift<'_> {
                 (2, 5) => page.uncompressed = self.integer()?,
                 (3, 5) => page.compressed = self.integer()?,
                 // data, dictionary, data of version 2: the number of values is the first in each
-                (5 | 7 | 8, 12) => {
+                (5 | 7 | 8, STRUCTURE) => {
                     page.is_dictionary = id == 7;
                     page.values = self.first_integer()?;
                 }
@@ -175,13 +201,13 @@ impl Thrift<'_> {
             9 | 10 if depth < DEEPEST => {
                 let head = self.byte()?;
                 let count = if head >> 4 == 15 { self.varint()? } else { u64::from(head >> 4) };
-                (0..count).try_for_each(|_| match head & 0x0f {
-                    // a boolean has a byte of its own within a list
-                    1 | 2 => self.pass(1),
-                    kind => self.skip(kind, depth + 1),
-                })
+                match head & 0x0f {
+                    // no structure of Parquet that is read has booleans in a list
+                    1 | 2 if count > 0 => None,
+                    kind => (0..count).try_for_each(|_| self.skip(kind, depth + 1)),
+                }
             }
-            12 if depth < DEEPEST => {
+            STRUCTURE if depth < DEEPEST => {
                 let mut id = 0;
                 while let Some(kind) = self.field(&mut id)? {
                     self.skip(kind, depth + 1)?;
