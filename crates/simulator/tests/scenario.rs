@@ -212,6 +212,7 @@ fn what_makes_no_sense_is_refused_with_the_key_and_what_would_be_right() {
         (minimal("", "").replace("a.csv", "../a.csv"), "is not a plain name"),
         (minimal("", "").replace("duration_s = 1.0", "duration_s = 0.0"), "run \"a.csv\": duration_s: 0 has to be"),
         ("device = \"t\"\nangular_gain = 0.0\nrun = []\n".to_owned(), "angular_gain: is 0"),
+        ("device = \"t\"\nangular_gain = 1.2e33\nrun = []\n".to_owned(), "is no angular gain"),
         ("device = \"t\"\nangular_gain = 0.7\nrun = []\n".to_owned(), "at least one [[run]]"),
     ] {
         let error = refusal(&text);

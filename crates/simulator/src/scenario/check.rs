@@ -9,6 +9,8 @@ use super::{EffectSetting, Instrument, Run, ScenarioError, Settings, Tuning};
 /// The longest recording, rows.
 const MOST_ROWS: f64 = 2e7;
 
+/// Magnitudes of an angular gain, as a campaign may state it: that of a gyroscope, or the periods a turn of an encoder.
+const POSSIBLE_GAIN: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// A gain that wanders further would change its sign.
 const LARGEST_WANDER: f64 = 0.03;
 
@@ -54,6 +56,12 @@ pub(super) fn settings(s: &Settings) -> Result<(), ScenarioError> {
         finite(field, value)?;
         if value == 0.0 {
             return Err(ScenarioError::invalid(field, "is 0: the angle would not follow the input"));
+        }
+        if !POSSIBLE_GAIN.contains(&value.abs()) {
+            return Err(ScenarioError::invalid(
+                field,
+                format!("{value} is no angular gain: its magnitude lies between 0.001 and 1000"),
+            ));
         }
     }
     if let Some(t) = &s.temperature {
