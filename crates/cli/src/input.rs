@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, Role};
+use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, Role, mapped_name};
 
 use crate::Failure;
 
@@ -203,6 +203,7 @@ pub(crate) fn explained(error: ReadError) -> Failure {
     let time = foreign.iter().find(is_time).or(foreign.first()).copied().unwrap_or("Time");
     let (channel, column) =
         if there("t_s") { ("theta_deg", foreign.first().copied().unwrap_or("Ch3")) } else { ("t_s", time) };
+    let column = mapped_name(column);
     let message = format!(
         "{error}; say which column is which, as in --map '{channel}={column}', or once for all in the [columns] of a \
          campaign.toml: t_s, the two channels xc_v and yc_v or an angle theta_deg, and the reference, table_deg or \

@@ -95,6 +95,16 @@ fn a_name_taken_from_the_message_is_read_in_the_unit_it_names() {
 }
 
 #[test]
+fn the_mapping_that_is_suggested_for_a_name_that_ends_like_a_factor_is_read() {
+    let bench = Bench::small();
+    bench.write("loose.csv", "Time/1000,rate_dps,theta_deg\n0,10,0\n0.1,10,1\n0.2,10,2\n");
+    let outcome = cvg(&[OsStr::new("inspect"), bench.path("loose.csv").as_os_str()]);
+    assert!(outcome.stderr.contains("--map 't_s=Time/1000*1'"), "{}", outcome.stderr);
+    let said = run(&[&"inspect", &bench.path("loose.csv"), &"--map", &"t_s=Time/1000*1"]);
+    assert!(said.contains("one every 0.100000 s"), "{said}");
+}
+
+#[test]
 fn a_compressed_recording_is_compensated_under_the_name_of_its_text() {
     let bench = Bench::small();
     let (campaign, results, clean) = (bench.campaign(), bench.path("results"), bench.path("clean"));

@@ -29,6 +29,7 @@ mod table;
 mod text;
 mod units;
 mod unknown;
+mod utf_16;
 
 use std::path::PathBuf;
 
@@ -38,7 +39,7 @@ pub use columns::Values;
 pub use dropped::{Dropped, Tally};
 pub use error::{Place, ReadError};
 pub use memory::{limit_memory, memory_limit, panic_is_answer};
-pub use naming::Naming;
+pub use naming::{Naming, mapped_name};
 #[cfg(feature = "parquet")]
 pub use parquet::{Lake, write_parquet, write_parquet_numbers};
 pub use text::{LARGEST_TEXT, read_text};

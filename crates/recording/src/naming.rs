@@ -143,6 +143,12 @@ impl Naming {
     }
 }
 
+/// What maps a column, as it is written in a mapping: a name that ends like a factor wants one of its own behind it.
+#[must_use]
+pub fn mapped_name(column: &str) -> String {
+    if factored(column).1.is_some() { format!("{column}*1") } else { column.to_owned() }
+}
+
 /// A column, and the number that it is multiplied by or, as a reciprocal, divided by.
 fn factored(text: &str) -> (&str, Option<f64>) {
     let number = text.rfind(['*', '/']).and_then(|at| {
@@ -186,6 +192,16 @@ mod tests {
         assert_eq!(of(Channel::Xc), ("a*b", Some(2.0)));
         assert_eq!(of(Channel::Yc), ("rad/s", None), "what is no number is part of the name");
         assert_eq!(of(Channel::Temperature), ("x/2", Some(1.0)));
+    }
+
+    #[test]
+    fn a_name_that_ends_like_a_factor_is_mapped_with_one_of_its_own() {
+        for column in ["Time/1000", "x*2", "Time (ms)", "rad/s"] {
+            let mut naming = Naming::default();
+            naming.add(&format!("t_s={}", mapped_name(column))).expect("a mapping");
+            assert_eq!(naming.channel(column), Some(Channel::Time), "{column}");
+        }
+        assert_eq!(mapped_name("Time (ms)"), "Time (ms)");
     }
 
     #[test]

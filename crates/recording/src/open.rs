@@ -1,6 +1,6 @@
 //! Which reader a file wants, told by its first bytes and its name; of a compressed file, by the first bytes in it.
 //!
-//! Refuses what is plainly something else (a directory, an archive, UTF-16 text) by saying what it is.
+//! Refuses what is plainly something else (a directory, an archive) by saying what it is.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read};
@@ -8,9 +8,9 @@ use std::path::Path;
 
 use super::error::ReadError;
 use super::naming::Naming;
-use super::{Recording, arrays, csv, gzip, memory, parquet};
+use super::{Recording, arrays, csv, gzip, memory, parquet, utf_16};
 
-const WANTED: &str = "CSV text in UTF-8 (as it is or in gzip), Parquet, MATLAB's .mat or HDF5";
+const WANTED: &str = "CSV text in UTF-8 or UTF-16 (as it is or in gzip), Parquet, MATLAB's .mat or HDF5";
 /// First bytes that tell every kind of file.
 const HEAD: u64 = 16;
 
@@ -66,6 +66,9 @@ impl Recording {
     /// # Errors
     /// As [`Recording::read`].
     pub fn parse_csv(bytes: &[u8], source: &Path) -> Result<Self, ReadError> {
+        if utf_16::is_one(bytes) {
+            return csv::read(utf_16::Decoding::new(bytes), None, Naming::NONE, source);
+        }
         refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
         csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
     }
@@ -109,6 +112,9 @@ fn unpacked(
         let what = "is Parquet, which is read from its end".to_owned();
         return Err(ReadError::Format { path: source.to_path_buf(), what, wanted: "a file, or another format" });
     }
+    if utf_16::is_one(&head) {
+        return csv::read(utf_16::Decoding::new(Cursor::new(head).chain(rest)), None, naming, source);
+    }
     refuse_other_kinds(&head, source)?;
     csv::read(Cursor::new(head).chain(rest), size, naming, source)
 }
@@ -124,9 +130,6 @@ fn whole(head: Vec<u8>, rest: impl Read, source: &Path) -> Result<Vec<u8>, ReadE
 fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {
     let refuse =
         |what: &str| Err(ReadError::Format { path: path.to_path_buf(), what: what.to_owned(), wanted: WANTED });
-    if magic.starts_with(&[0xff, 0xfe]) || magic.starts_with(&[0xfe, 0xff]) {
-        return refuse("is text in UTF-16");
-    }
     if magic.starts_with(&[0x1f, 0x8b]) {
         return refuse("is compressed with gzip twice");
     }
