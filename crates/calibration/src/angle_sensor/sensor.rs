@@ -2,17 +2,23 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::{SMatrix, SVector};
+
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
 use super::units::{UNITS, Unit, by_gain};
 use crate::error::Refusal;
-use crate::numerics::angles::wrapped;
+use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{circular_mean, median};
+use crate::numerics::statistics::{circular_mean, line, median};
 
-/// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one.
+/// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one, and one
+/// up to so far from it where errors once and twice a turn could have made the difference.
 const WHOLE: f64 = 0.02;
+const WHOLE_BESIDE_ERRORS: f64 = 0.05;
+/// Standard errors within which a slope is what it could be (95 %).
+const BY_CHANCE: f64 = 2.0;
 /// Samples whose circular mean begins the unwrapping of an error.
 const BEGINNING: usize = 50;
 
@@ -61,7 +67,11 @@ impl Sensor {
             ));
         }
         let size = stated_gain.unwrap_or_else(|| magnitude(runs, period)).abs();
-        let whole = (size - size.round()).abs() < if stated_gain.is_some() { 1e-9 } else { WHOLE } && size > 0.5;
+        let near = |reach: f64| (size - size.round()).abs() < reach && size > 0.5;
+        let whole = match stated_gain {
+            Some(_) => near(1e-9),
+            None => near(WHOLE) || (near(WHOLE_BESIDE_ERRORS) && could_be(size.round(), runs, period)),
+        };
         let size = if whole { size.round() } else { size };
         let sensor = Self { gain: size, free_gain: !whole, period, cycles: TAU / period };
         let opposite = sensor.misfit(runs, -size) < sensor.misfit(runs, size);
@@ -222,7 +232,12 @@ fn turning_left(channels: &[[f64; 2]], reference: &[f64], gain: f64) -> f64 {
 
 /// |gain| where none is stated: the slope of the followed angle over the reference, in the run that turns the furthest.
 pub(super) fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
-    let Some(longest) = runs.iter().max_by(|a, b| a.travel_rad().total_cmp(&b.travel_rad())) else { return 1.0 };
+    longest(runs, period).map_or(1.0, |(reference, followed)| line(reference, &followed).0.abs())
+}
+
+/// Reference and followed angle of the run that turns the furthest.
+fn longest(runs: &[SensorRun], period: f64) -> Option<(&[f64], Vec<f64>)> {
+    let longest = runs.iter().max_by(|a, b| a.travel_rad().total_cmp(&b.travel_rad()))?;
     let theta: Vec<f64> = match &longest.reading {
         Reading::Angle(theta) => theta.clone(),
         Reading::Channels(v) => {
@@ -230,6 +245,69 @@ pub(super) fn magnitude(runs: &[SensorRun], period: f64) -> f64 {
             v.iter().map(|z| start.angle(*z)).collect()
         }
     };
-    let followed = crate::numerics::angles::unwrapped(theta.into_iter(), period);
-    crate::numerics::statistics::line(&longest.reference_rad, &followed).0.abs()
+    Some((&longest.reference_rad, unwrapped(theta.into_iter(), period)))
+}
+
+/// Whether |gain| could be `size`: by the slope of the followed angle beside errors once and twice a turn, which a line alone takes
+/// a share of where the reference turns little more than once.
+fn could_be(size: f64, runs: &[SensorRun], period: f64) -> bool {
+    let Some((reference, followed)) = longest(runs, period) else { return false };
+    let begin = reference.first().copied().unwrap_or(0.0);
+    let rows: Vec<SVector<f64, 6>> = reference
+        .iter()
+        .map(|a| {
+            let ([s1, c1], [s2, c2]) = ([a.sin(), a.cos()], [(2.0 * a).sin(), (2.0 * a).cos()]);
+            SVector::from([a - begin, 1.0, s1, c1, s2, c2])
+        })
+        .collect();
+    let normal: SMatrix<f64, 6, 6> = rows.iter().map(|r| r * r.transpose()).sum();
+    let right: SVector<f64, 6> = rows.iter().zip(&followed).map(|(r, f)| r * *f).sum();
+    let Some(inverse) = normal.try_inverse().filter(|_| rows.len() > 6) else { return false };
+    let x = inverse * right;
+    let left: f64 = rows.iter().zip(&followed).map(|(r, f)| (f - r.dot(&x)).powi(2)).sum();
+    let deviation = (left / (rows.len() - 6) as f64 * inverse[(0, 0)]).max(0.0).sqrt();
+    (x[0].abs() - size).abs() <= BY_CHANCE * deviation
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::expect_used, reason = "a test fails by panicking")]
+    use super::*;
+    use crate::recording::Role;
+
+    /// Stations over one turn, with an error of 4.6° once a turn and noise of 0.5°.
+    fn stations(gain: f64) -> Vec<SensorRun> {
+        let reference_rad: Vec<f64> = (0..40).map(|i| f64::from(i) * 9.0_f64.to_radians()).collect();
+        let noise = crate::numerics::statistics::remembered(0.0, reference_rad.len(), 7);
+        let of = |(a, noise): (&f64, &f64)| gain * a + 0.08 * a.sin() + 0.009 * noise;
+        let theta = reference_rad.iter().zip(&noise).map(of).collect();
+        let (none, t_s) = (vec![0.0; reference_rad.len()], (0..40).map(f64::from).collect());
+        vec![SensorRun {
+            name: "dial.csv".into(),
+            number: 0,
+            role: Role::Fit,
+            commanded: false,
+            t_s,
+            reference_rad,
+            rate_rad_s: none.clone(),
+            acceleration_rad_s2: none,
+            reading: Reading::Angle(theta),
+        }]
+    }
+
+    #[test]
+    fn an_error_once_a_turn_does_not_make_a_gear_of_a_sensor() {
+        let runs = stations(-1.0);
+        assert!((magnitude(&runs, TAU) - 1.0).abs() > WHOLE, "the line takes its share of the error");
+        let sensor = Sensor::new(None, TAU, &runs).expect("a sensor");
+        assert_eq!((sensor.gain, sensor.free_gain), (-1.0, false));
+    }
+
+    #[test]
+    fn a_gear_that_is_nearly_whole_stays_a_gear() {
+        let runs = stations(0.98);
+        assert!((magnitude(&runs, TAU) - 1.0).abs() < WHOLE_BESIDE_ERRORS, "near enough to be asked about");
+        let sensor = Sensor::new(None, TAU, &runs).expect("a sensor");
+        assert!(sensor.free_gain, "{sensor:?}");
+    }
 }
