@@ -126,7 +126,7 @@ fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) 
     let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
         let mut identified = free_decay::identify(campaign, options, with_plots)?;
-        identified.report.warnings.extend(not_tried(options, "free decays"));
+        identified.report.warnings.extend(not_tried(&options.effects, "effects as text do not compete in free decays"));
         return Ok(identified);
     }
     let (campaign, decays) = free_decay::apart(campaign);
@@ -141,9 +141,7 @@ fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) 
 fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
-        let mut identified = angle_sensor::identify(campaign, options, with_plots)?;
-        identified.report.warnings.extend(not_tried(options, "an angle sensor"));
-        return Ok(identified);
+        return angle_sensor::identify(campaign, options, with_plots);
     }
     let head = Head {
         device: campaign.device.clone(),
@@ -464,15 +462,10 @@ fn confounded(e: &EffectReport) -> String {
     )
 }
 
-/// Says that effects as text had no part in an answer.
-fn not_tried(options: &Options<'_>, of: &str) -> Option<String> {
-    let ids: Vec<&str> = options.effects.iter().map(|e| e.description().id).collect();
-    (!ids.is_empty()).then(|| {
-        format!(
-            "{} had no part in this: effects as text compete in a gyroscope's rotation runs, not in {of}",
-            ids.join(", ")
-        )
-    })
+/// Says that effects as text had no part in an answer, and why.
+pub(crate) fn not_tried(effects: &[EffectId], why: &str) -> Option<String> {
+    let ids: Vec<&str> = effects.iter().map(|e| e.description().id).collect();
+    (!ids.is_empty()).then(|| format!("{} had no part in this: {why}", ids.join(", ")))
 }
 
 /// An identification has an angle and what it should be in every run that turns.
