@@ -6,7 +6,7 @@ use crate::carrier;
 use crate::data::copies::without_copies;
 use crate::error::Refusal;
 use crate::free_decay;
-use crate::identified::{Identification, Options};
+use crate::identified::{Identification, Options, not_tried};
 use crate::rate_table;
 use crate::recording::{Campaign, Reference, RunKind};
 use crate::report::RunReport;
@@ -43,7 +43,7 @@ fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) 
     let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
         let mut identified = free_decay::identify(campaign, options, with_plots)?;
-        identified.report.warnings.extend(not_tried(options, "free decays"));
+        identified.report.warnings.extend(not_tried(&options.effects, "effects as text do not compete in free decays"));
         return Ok(identified);
     }
     let (campaign, decays) = free_decay::apart(campaign);
@@ -58,22 +58,9 @@ fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) 
 fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
     if angle_sensor::serves(&campaign) {
-        let mut identified = angle_sensor::identify(campaign, options, with_plots)?;
-        identified.report.warnings.extend(not_tried(options, "an angle sensor"));
-        return Ok(identified);
+        return angle_sensor::identify(campaign, options, with_plots);
     }
     rate_table::identify(campaign, options, with_plots)
-}
-
-/// Says that effects as text had no part in an answer.
-fn not_tried(options: &Options<'_>, of: &str) -> Option<String> {
-    let ids: Vec<&str> = options.effects.iter().map(|e| e.description().id).collect();
-    (!ids.is_empty()).then(|| {
-        format!(
-            "{} had no part in this: effects as text compete in a gyroscope's rotation runs, not in {of}",
-            ids.join(", ")
-        )
-    })
 }
 
 /// An identification has an angle and what it should be in every run that turns.

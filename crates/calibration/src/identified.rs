@@ -65,3 +65,9 @@ pub struct BiasCurve {
     /// after all, deg
     pub discovered_deg: Vec<f64>,
 }
+
+/// Says that effects as text had no part in an answer, and why.
+pub(crate) fn not_tried(effects: &[EffectId], why: &str) -> Option<String> {
+    let ids: Vec<&str> = effects.iter().map(|e| e.description().id).collect();
+    (!ids.is_empty()).then(|| format!("{} had no part in this: {why}", ids.join(", ")))
+}

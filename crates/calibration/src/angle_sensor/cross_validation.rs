@@ -222,6 +222,8 @@ pub(crate) fn losses_of_radius(
 pub(crate) struct Candidate<M> {
     /// unknowns
     pub(crate) size: usize,
+    /// of these, unknowns of effects as text
+    pub(crate) texts: usize,
     pub(crate) model: M,
     pub(crate) losses: Losses,
     /// of the radius, where its readout says something of it
@@ -229,8 +231,9 @@ pub(crate) struct Candidate<M> {
 }
 
 /// The simplest candidate that is as good as the best. A readout is also seen in the radius: of candidates that predict the
-/// angle alike, those remain that predict the radius as well as the best of them. Ties of size go to the smaller loss, and
-/// ties of that to the order of the models: the order in which they were tried has no say.
+/// angle alike, those remain that predict the radius as well as the best of them. Ties of size go to the library rather than to
+/// an effect as text, then to the smaller loss, and ties of that to the order of the models: the order in which they were tried has
+/// no say.
 pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) -> Option<&Candidate<M>> {
     let by_loss = |a: &&Candidate<M>, b: &&Candidate<M>| {
         a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
@@ -243,7 +246,7 @@ pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) 
         .iter()
         .copied()
         .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best, tolerance)))
-        .min_by(|a, b| a.size.cmp(&b.size).then_with(|| by_loss(a, b)))
+        .min_by(|a, b| a.size.cmp(&b.size).then(a.texts.cmp(&b.texts)).then_with(|| by_loss(a, b)))
 }
 
 #[cfg(test)]
@@ -251,7 +254,7 @@ mod tests {
     use super::*;
 
     fn candidate(size: usize, model: &'static str, sum: [f64; 4]) -> Candidate<&'static str> {
-        Candidate { size, model, losses: Losses { sum: sum.to_vec(), rows: 4 }, of_radius: None }
+        Candidate { size, texts: 0, model, losses: Losses { sum: sum.to_vec(), rows: 4 }, of_radius: None }
     }
 
     #[test]

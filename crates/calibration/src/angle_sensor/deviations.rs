@@ -1,19 +1,26 @@
 //! How far what was fitted to an angle sensor may be off: the jackknife over contiguous blocks, which counts what noise
 //! remembers, and beyond it what the model leaves open: another noise, another weighting, what a table may hold.
 
-use super::effects::LibraryReadout;
-use super::model::SensorModel;
-use super::readout::{Kind, Readout};
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, Parameter, Values};
+
+use super::effects::{LIBRARY_VALUES, LibraryReadout};
+use super::model::{SensorModel, by_run};
+use super::readout::{Kind, Readout, Unknown};
 use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
 use super::table_fit::TableFit;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 
+/// Deviations from which on a parameter of an effect as text is no chance: by Student's t of 19 degrees of freedom 1 in 2,000.
+const NO_CHANCE: f64 = 4.2;
+/// A change of a parameter, in its scale, that shows what it does.
+const NUDGE: f64 = 1e-3;
+
 /// Deviations of all that was fitted, by the jackknife over contiguous blocks.
 #[derive(Debug, Clone)]
 pub(crate) struct Deviations {
-    /// of [`LibraryReadout::values`]
-    pub(crate) readout: [f64; 6],
+    /// of [`values`]
+    pub(crate) readout: Vec<f64>,
     /// of [`TableFit::side`]
     pub(crate) side: Vec<f64>,
     /// of the table's cosines and sines
@@ -21,8 +28,28 @@ pub(crate) struct Deviations {
     pub(crate) sin: Vec<f64>,
 }
 
+impl Deviations {
+    /// The effects as text of a readout of which no parameter is far enough from its absence to be more than a chance.
+    pub(crate) fn texts_not_told(&self, readout: &Readout) -> Vec<EffectId> {
+        let absent = |(at, (id, values)): (usize, &(EffectId, Values<f64>))| {
+            let own = &self.readout[LIBRARY_VALUES + at * MAX_PARAMETERS..];
+            let parameters = id.description().parameters.iter().zip(values).zip(own);
+            let told =
+                |((p, value), deviation): ((&Parameter, &f64), &f64)| (value - p.neutral).abs() > NO_CHANCE * deviation;
+            (!parameters.into_iter().any(told)).then_some(*id)
+        };
+        readout.texts.iter().enumerate().filter_map(absent).collect()
+    }
+}
+
 /// A fit without one block: the readout, where there is one, and the table.
-type Refit = (Option<LibraryReadout>, TableFit);
+type Refit = (Option<Readout>, TableFit);
+
+/// Values of a readout: those of the library ([`LibraryReadout::values`]), and after them those of its effects as text.
+pub(crate) fn values(readout: &Readout) -> Vec<f64> {
+    let texts = readout.texts.iter().flat_map(|(_, values)| values);
+    LibraryReadout::from(readout).values().iter().chain(texts).copied().collect()
+}
 
 /// Makes every fit anew without one block of each run after the other (Künsch 1989).
 pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations {
@@ -38,16 +65,21 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
             };
             let samples = model.sensor.samples(&kept, readout.as_ref());
             let table = TableFit::new(&model.table.shape, &samples, kept.len(), model.sensor.cycles)?;
-            Some((readout.as_ref().map(LibraryReadout::from), table))
+            Some((readout, table))
         })
         .collect();
     let of = |value: &dyn Fn(&Refit) -> f64| jackknife(&fits.iter().map(value).collect::<Vec<_>>());
-    let readout = |i: usize| of(&|f| f.0.map_or(0.0, |r| r.values()[i]));
+    let count = model.front().map_or(0, |r| values(r).len());
+    let readout = |i: usize| of(&|f| f.0.as_ref().map_or(0.0, |r| values(r)[i]));
     let order = model.table.table.cos.len();
-    let others = [noise_model_difference(model, runs), weighting_difference(model, runs), held_by_table(model)];
-    let beyond = |i: usize| others.iter().fold(0.0, |sum: f64, other| sum.hypot(other[i])) / STUDENT_19;
+    let mut held = held_by_table(model).to_vec();
+    held.extend(of_texts_held_by_table(model, runs));
+    let others = [noise_model_difference(model, runs).to_vec(), weighting_difference(model, runs), held];
+    let beyond = |i: usize| {
+        others.iter().fold(0.0, |sum: f64, other| sum.hypot(other.get(i).copied().unwrap_or(0.0))) / STUDENT_19
+    };
     Deviations {
-        readout: std::array::from_fn(|i| readout(i).hypot(beyond(i))),
+        readout: (0..count).map(|i| readout(i).hypot(beyond(i))).collect(),
         side: (0..model.table.side.len()).map(|i| of(&|f| f.1.side[i])).collect(),
         cos: (0..order).map(|i| of(&|f| f.1.table.cos[i])).collect(),
         sin: (0..order).map(|i| of(&|f| f.1.table.sin[i])).collect(),
@@ -84,15 +116,46 @@ fn noise_model_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
 /// By what the readout would differ if angle and radius counted by their own variances, where another weighting was
 /// selected. Both estimate the same where the model is right; where it is not, they differ by more than either scatters
 /// (Hausman 1978).
-fn weighting_difference(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
-    let Some((ours, weighting)) = &model.readout else { return [0.0; 6] };
+fn weighting_difference(model: &SensorModel, runs: &[SensorRun]) -> Vec<f64> {
+    let Some((ours, weighting)) = &model.readout else { return Vec::new() };
     if model.by_radius || ours.kind == Kind::Plain || *weighting == Weighting::VarianceComponents {
-        return [0.0; 6];
+        return Vec::new();
     }
     let theirs = fit(ours.kind, Weighting::VarianceComponents, runs, model.sensor.gain, ours);
-    let [ours, theirs] = [Some(ours), theirs.as_ref().map(|f| &f.readout)]
-        .map(|r| r.map_or([f64::INFINITY; 6], |r| LibraryReadout::from(r).values()));
-    std::array::from_fn(|i| ours[i] - theirs[i])
+    let ours = values(ours);
+    theirs.map_or_else(
+        || vec![f64::INFINITY; ours.len()],
+        |theirs| ours.iter().zip(values(&theirs.readout)).map(|(ours, theirs)| ours - theirs).collect(),
+    )
+}
+
+/// What a table beside effects as text may hold of their parameters: its projection on what a unit of a parameter does to
+/// the angle.
+fn of_texts_held_by_table(model: &SensorModel, runs: &[SensorRun]) -> Vec<f64> {
+    let Some(readout) = model.front() else { return Vec::new() };
+    let (table, cycles) = (&model.table.table, model.sensor.cycles);
+    let errors = |r: &Readout| {
+        let samples = model.sensor.samples(runs, Some(r));
+        by_run(&samples, runs.len(), |s| s.error).concat()
+    };
+    let samples = model.sensor.samples(runs, Some(readout));
+    let held = by_run(&samples, runs.len(), |s| table.undo(s.theta, cycles) - s.theta).concat();
+    let base = errors(readout);
+    let of_parameter = |at: usize, i: usize| {
+        let mut moved = readout.clone();
+        let unknown = Unknown::Text(at, i);
+        moved.set(unknown, readout.value(unknown) + NUDGE);
+        let by = moved.texts[at].1[i] - readout.texts[at].1[i];
+        let does: Vec<f64> = errors(&moved).iter().zip(&base).map(|(moved, base)| (moved - base) / by).collect();
+        let square: f64 = does.iter().map(|d| d * d).sum();
+        let along: f64 = does.iter().zip(&held).map(|(d, h)| d * h).sum();
+        if square > 0.0 { along / square } else { 0.0 }
+    };
+    let of_text = |(at, (id, _)): (usize, &(EffectId, Values<f64>))| -> [f64; MAX_PARAMETERS] {
+        let parameters = id.description().parameters.len();
+        std::array::from_fn(|i| if i < parameters { of_parameter(at, i) } else { 0.0 })
+    };
+    readout.texts.iter().enumerate().flat_map(of_text).collect()
 }
 
 /// What a table beside the readout may hold of its parameters: offsets make a harmonic 1 of the angle, gain and skew a

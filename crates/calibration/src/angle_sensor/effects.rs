@@ -1,9 +1,9 @@
 //! An identified sensor in the words of the library: its readout as library effects with intervals, its table, lines and
 //! following of motion as what they are, and the hypothesis that undoes them.
 
-use cvg_model::effects::{EffectId, harmonic_n};
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, harmonic_n};
 
-use super::deviations::Deviations;
+use super::deviations::{Deviations, values};
 use super::model::{Outcome, SensorModel};
 use super::readout::{Kind, Readout};
 use super::table_fit::Motion;
@@ -11,6 +11,9 @@ use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
 use crate::recording::Instrument;
 use crate::report::{EffectReport, Estimate, ParameterReport};
+
+/// How many values of the library a readout has.
+pub(crate) const LIBRARY_VALUES: usize = 6;
 
 /// Values of a readout in the parameters of the library.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +54,7 @@ impl From<&Readout> for LibraryReadout {
 
 impl LibraryReadout {
     /// Offsets, gain ratio, skew, cubics.
-    pub(crate) fn values(&self) -> [f64; 6] {
+    pub(crate) fn values(&self) -> [f64; LIBRARY_VALUES] {
         [self.offset[0], self.offset[1], self.gain_ratio, self.skew, self.kappa, self.kappa_difference]
     }
 }
@@ -135,7 +138,7 @@ impl Described<'_> {
 
     fn readout_effects(&self) -> Vec<EffectReport> {
         let Some((readout, _)) = &self.model.readout else { return Vec::new() };
-        readout_effects(readout, self.deviations.readout, &self.evidence())
+        readout_effects(readout, &self.deviations.readout, &self.evidence())
     }
 
     fn motion_effects(&self) -> Vec<EffectReport> {
@@ -252,8 +255,8 @@ impl Described<'_> {
 }
 
 /// A readout in the words of the library, with the deviations of its values.
-pub(crate) fn readout_effects(readout: &Readout, d: [f64; 6], evidence: &str) -> Vec<EffectReport> {
-    let v = LibraryReadout::from(readout).values();
+pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> Vec<EffectReport> {
+    let v = values(readout);
     let significant = |i: usize, neutral: f64| (v[i] - neutral).abs() > STUDENT_19 * d[i];
     let mut out = Vec::new();
     let mut add = |id: EffectId, origin: Origin, at: &[usize]| {
@@ -273,6 +276,11 @@ pub(crate) fn readout_effects(readout: &Readout, d: [f64; 6], evidence: &str) ->
     }
     if kind >= Kind::Cubic && (significant(4, 0.0) || significant(5, 0.0)) {
         add(EffectId::DetectionCubic, Origin::Discovered, if kind == Kind::Cubic { &[4] } else { &[4, 5] });
+    }
+    for (at, (id, _)) in readout.texts.iter().enumerate() {
+        let first = LIBRARY_VALUES + at * MAX_PARAMETERS;
+        let all: Vec<usize> = (first..first + id.description().parameters.len()).collect();
+        add(*id, Origin::Discovered, &all);
     }
     if readout.rails.any() {
         let names = ["x_low", "x_high", "y_low", "y_high"];
@@ -300,6 +308,7 @@ pub(crate) fn readout_members(readout: &Readout) -> Vec<(EffectId, Origin, [f64;
     if readout.kind >= Kind::Cubic {
         out.push((EffectId::DetectionCubic, Origin::Discovered, [v.kappa, v.kappa_difference, 0.0, 0.0]));
     }
+    out.extend(readout.texts.iter().map(|(id, values)| (*id, Origin::Discovered, *values)));
     out
 }
 

@@ -1,7 +1,7 @@
 //! The main job for angle sensors and rate gyroscopes: runs made ready, a model selected and fitted, the held-out rows read
 //! once at the end, and a report of it all.
 
-use super::deviations::{deviations, own_gain_ratios};
+use super::deviations::{Deviations, deviations, own_gain_ratios};
 use super::effects::Described;
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
@@ -16,7 +16,7 @@ use super::units::{of_the_angle, of_the_reference, require_degrees};
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
-use crate::identified::{Identification, Options};
+use crate::identified::{Identification, Options, not_tried};
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::numerics::statistics::median;
 use crate::numerics::statistics::span;
@@ -24,7 +24,7 @@ use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::gate::least_held_out;
 use crate::report::inference::{CONTRADICTS, covering};
 use crate::report::{EffectReport, Estimate, ParameterReport, Share};
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Stage};
 
 /// A campaign without a pattern: an angle sensor, or the integrated output of a rate gyroscope, whose angle goes round once
 /// a turn.
@@ -95,12 +95,14 @@ pub(crate) fn identify(
         ));
     }
     (options.progress)("choosing a model of the sensor");
+    let (texts, why_not) = competing(&options.effects, &fitted);
     let mut finding = if rate_gyroscope {
         rate_finding(stated, period, &fitted, &held)?
     } else {
-        sensor_finding(stated, sense, period, &fitted, &held, rates_alone)?
+        sensor_finding(stated, sense, period, [&fitted, &held], rates_alone, &texts)?
     };
     finding.warnings.extend(left_out);
+    finding.warnings.extend(why_not);
     (options.progress)("measuring the held-out error");
     report(head, finding, &fitted, &held, with_plots)
 }
@@ -176,18 +178,47 @@ fn said_of(
     Ok(warnings)
 }
 
+/// The effects as text that compete in a sensor: of the readout and of nothing but its two channels; and what to say of the
+/// others.
+fn competing(effects: &[EffectId], runs: &[SensorRun]) -> (Vec<EffectId>, Option<String>) {
+    let channels = runs.iter().all(|r| r.channels().is_some()) && !runs.iter().all(|r| r.commanded);
+    let (texts, others): (Vec<_>, Vec<_>) =
+        effects.iter().partition(|id| channels && id.description().stage == Stage::Readout && id.is_of_the_channels());
+    let why = "of an angle sensor compete effects of the stage readout, without first, that ask for x, y and what these make up, \
+               where two channels stand beside a measured reference";
+    (texts, not_tried(&others, why))
+}
+
+/// The model of a sensor, with the deviations of its values. An effect as text that the intervals do not tell from its absence
+/// is none: the model is identified without it.
+fn identified(
+    stated: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    mut texts: Vec<EffectId>,
+) -> Result<(SensorModel, Deviations), Refusal> {
+    loop {
+        let model = SensorModel::identify(stated, period, runs, &texts)?;
+        let deviations = deviations(&model, &thinned(runs));
+        let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
+        if unsure.is_empty() {
+            return Ok((model, deviations));
+        }
+        texts.retain(|id| !unsure.contains(id));
+    }
+}
+
 fn sensor_finding(
     stated: Option<f64>,
     sense: Option<f64>,
     period: f64,
-    runs: &[SensorRun],
-    held: &[SensorRun],
+    [runs, held]: [&[SensorRun]; 2],
     rates_alone: bool,
+    texts: &[EffectId],
 ) -> Result<Finding<'static>, Refusal> {
-    let model = SensorModel::identify(stated, period, runs)?;
+    let (model, deviations) = identified(stated, period, runs, texts.to_vec())?;
     require_following(runs, model.sensor.gain)?;
     let thinned = thinned(runs);
-    let deviations = deviations(&model, &thinned);
     let described = Described { model: &model, deviations: &deviations };
     let raw_turns = raw_turns(&model);
     let declared = model.front().map(|r| r.declared(raw_turns));

@@ -1,5 +1,7 @@
 //! The identified sensor: what was selected, fitted to all rows, with the checks that decide whether it is an answer.
 
+use cvg_model::effects::EffectId;
+
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
@@ -46,11 +48,16 @@ pub(crate) struct SensorModel {
 }
 
 impl SensorModel {
-    /// Identifies a sensor from the runs to fit.
+    /// Identifies a sensor from the runs to fit, with effects as text that compete.
     ///
     /// # Errors
     /// Where nothing is left that can be inverted.
-    pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Result<Self, Refusal> {
+    pub(crate) fn identify(
+        stated_gain: Option<f64>,
+        period: f64,
+        runs: &[SensorRun],
+        texts: &[EffectId],
+    ) -> Result<Self, Refusal> {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         if runs.iter().all(|r| r.commanded && r.channels().is_some()) {
             return Self::by_radius(sensor, runs);
@@ -60,7 +67,7 @@ impl SensorModel {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
-        let selected = Selection::new(&sensor, runs, rails, &starts).select();
+        let selected = Selection::new(&sensor, runs, rails, &starts, texts).select();
         let refusal = || {
             Refusal::no_answer(
                 "campaign",
@@ -87,10 +94,8 @@ impl SensorModel {
         let (front, shape) = &selected.model;
         let readout = match front {
             None => None,
-            Some((Kind::Plain, weighting)) => Some((Readout { rails, ..Readout::plain() }, *weighting)),
-            Some((kind, weighting)) => {
-                Some((fit_from(starts, rails, *kind, *weighting, runs, sensor.gain)?.readout, *weighting))
-            }
+            Some((Kind::Plain, weighting, _)) => Some((Readout { rails, ..Readout::plain() }, *weighting)),
+            Some(front) => Some((fit_from(starts, rails, front, runs, sensor.gain)?.readout, front.1)),
         };
         let samples = sensor.samples(runs, readout.as_ref().map(|r| &r.0));
         let errors = by_run(&samples, runs.len(), |s| s.error);
@@ -98,7 +103,7 @@ impl SensorModel {
         let mut table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
         let mut predicted = selected.losses.rms();
         let left = by_run(&samples, runs.len(), |s| table.left(s));
-        let unknowns = readout.as_ref().map_or(0, |r| r.0.kind.free().len()) + shape.size();
+        let unknowns = readout.as_ref().map_or(0, |r| r.0.free().len()) + shape.size();
         let mut gain = autoregression::gain(&raw_errors, &left, unknowns);
         if gain <= 0.0
             && let (Some((found, _)), Some(alone)) = (&readout, &selected.readout_alone)
@@ -106,7 +111,7 @@ impl SensorModel {
         {
             // what the memory of the noise explains as well is no table; a readout shows in the radius, too
             let raw = Readout { rails: found.rails, ..Readout::plain() };
-            gain = autoregression::gain(&raw_errors, &errors, found.kind.free().len())
+            gain = autoregression::gain(&raw_errors, &errors, found.free().len())
                 + autoregression::gain(&ln_radius(runs, &raw), &ln_radius(runs, found), 0);
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
             predicted = alone.rms();
@@ -143,7 +148,7 @@ impl SensorModel {
                     fit(kind, Weighting::Radius, &kept, sensor.gain, &start).map(|f| f.readout)
                 };
                 let losses = losses_of_radius(without, &folds, runs)?;
-                Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
+                Some(Candidate { size: kind.free().len(), texts: 0, model: kind, losses, of_radius: None })
             })
             .collect();
         let chosen =

@@ -5,7 +5,11 @@
 //! $$x_d = o_x + A\\,c_x(\cos θ), \quad y_d = o_y + A g\\,(c_y(\sin θ) + s\\,c_x(\cos θ)), \quad
 //! c(u) = u\\,(1 + κ(u^2 - \tfrac34))$$
 //!
-//! The −¾ keeps the fundamental of c: κ does not change what g and A mean.
+//! The −¾ keeps the fundamental of c: κ does not change what g and A mean. Effects as text are what the signal meets last, and
+//! are in the unit of the channels.
+
+use cvg_model::Envelope;
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Role, Values};
 
 use super::rails::Rails;
 
@@ -43,6 +47,15 @@ impl Kind {
     }
 }
 
+/// Something of a readout that a fit adjusts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unknown {
+    /// one of [`UNKNOWNS`]
+    Own(usize),
+    /// of an effect as text, a parameter
+    Text(usize, usize),
+}
+
 /// Largest ratio of the axes of an ellipse that still has an angle: engineering choice.
 pub(crate) const LARGEST_AXES_RATIO: f64 = 30.0;
 /// Largest skew and cubic that leave a readout with an inverse: beyond, c(u) turns back within the circle.
@@ -65,6 +78,8 @@ pub(crate) struct Readout {
     pub(crate) radius: f64,
     /// o_x, o_y in amplitudes, ln g, s, κ_x, κ_y
     pub(crate) p: [f64; UNKNOWNS],
+    /// effects as text with their values, in the order in which the signal meets them
+    pub(crate) texts: Vec<(EffectId, Values<f64>)>,
 }
 
 impl Readout {
@@ -77,6 +92,7 @@ impl Readout {
             rails: Rails::none(),
             radius: 1.0,
             p: [0.0; UNKNOWNS],
+            texts: Vec::new(),
         }
     }
 
@@ -95,9 +111,52 @@ impl Readout {
         Self { kind, p, ..self.clone() }
     }
 
+    /// The same with effects as text: absent yet, but for those without a slope there, which begin at their onset of this
+    /// number.
+    pub(crate) fn with_texts(&self, texts: &[EffectId], onset: usize) -> Self {
+        let begun = |id: &EffectId| {
+            let (mut values, onsets) = (id.neutral(), id.description().onsets);
+            if let Some(share) = onsets.get(onset).or(onsets.last()) {
+                values[0] = share / self.amplitude;
+            }
+            (*id, values)
+        };
+        Self { texts: texts.iter().map(begun).collect(), ..self.clone() }
+    }
+
+    /// What a fit adjusts of it.
+    pub(crate) fn free(&self) -> Vec<Unknown> {
+        let own = self.kind.free().iter().map(|i| Unknown::Own(*i));
+        own.chain(unknowns_of(self.texts.iter().map(|t| &t.0))).collect()
+    }
+
+    /// The value of an unknown: of an effect as text in the scale of its parameter, from neutral on.
+    pub(crate) fn value(&self, unknown: Unknown) -> f64 {
+        match unknown {
+            Unknown::Own(i) => self.p[i],
+            Unknown::Text(at, i) => {
+                let (id, values) = &self.texts[at];
+                let of = &id.description().parameters[i];
+                (values[i] - of.neutral) / of.scale
+            }
+        }
+    }
+
+    /// Sets an unknown, within the bounds of its parameter where it has some.
+    pub(crate) fn set(&mut self, unknown: Unknown, value: f64) {
+        match unknown {
+            Unknown::Own(i) => self.p[i] = value,
+            Unknown::Text(at, i) => {
+                let (id, values) = &mut self.texts[at];
+                let of = &id.description().parameters[i];
+                values[i] = (of.neutral + of.scale * value).clamp(of.lower, of.upper);
+            }
+        }
+    }
+
     /// What the paper's model has of it: the gain ratio, and the centre only where there is no angle without it.
     pub(crate) fn declared(&self, raw_turns: bool) -> Self {
-        let mut out = Self { p: [0.0; UNKNOWNS], ..self.clone() };
+        let mut out = Self { p: [0.0; UNKNOWNS], texts: Vec::new(), ..self.clone() };
         out.p[2] = self.p[2];
         if raw_turns {
             out.centre = [0.0; 2];
@@ -115,11 +174,28 @@ impl Readout {
     /// The point on the unit circle behind a reading, rails not regarded.
     #[inline]
     pub(crate) fn undo(&self, z: [f64; 2]) -> [f64; 2] {
+        self.undo_own(self.without_texts(z))
+    }
+
+    /// The point on the unit circle behind what the effects as text acted on.
+    #[inline]
+    pub(crate) fn undo_own(&self, z: [f64; 2]) -> [f64; 2] {
         let p = &self.p;
         let x = (z[0] - self.centre[0]) / self.amplitude - p[0];
         let y = ((z[1] - self.centre[1]) / self.amplitude - p[1]) / p[2].exp() - p[3] * x;
         let [kx, ky] = self.cubics();
         [without_cubic(x, kx), without_cubic(y, ky)]
+    }
+
+    /// A reading before the effects as text acted on it; not a number where one of them has no inverse.
+    #[inline]
+    pub(crate) fn without_texts(&self, z: [f64; 2]) -> [f64; 2] {
+        if self.texts.is_empty() {
+            return z;
+        }
+        let e = Envelope::new(z[0], 0.0, z[1], 0.0);
+        let undone = self.texts.iter().rev().fold(e, |e, (id, values)| id.unread(values, e, &Moment::default()));
+        [undone.x_c, undone.y_c]
     }
 
     /// ln of the radius behind a reading.
@@ -141,11 +217,26 @@ impl Readout {
 
     /// The parameters leave an ellipse with an angle and a cubic with an inverse.
     pub(crate) fn is_sound(&self) -> bool {
-        self.p.iter().all(|v| v.is_finite())
+        self.p.iter().chain(self.texts.iter().flat_map(|t| &t.1)).all(|v| v.is_finite())
             && self.p[2].abs() < LARGEST_AXES_RATIO.ln()
             && self.p[3].abs() < LARGEST_SKEW
             && self.cubics().iter().all(|k| k.abs() < LARGEST_CUBIC)
     }
+}
+
+/// What a fit adjusts of effects as text.
+fn unknowns_of<'a>(texts: impl Iterator<Item = &'a EffectId>) -> impl Iterator<Item = Unknown> {
+    let is_fitted = |id: &EffectId, i: usize| {
+        id.description().parameters.get(i).is_some_and(|p| !matches!(p.role, Role::Chosen(_)))
+    };
+    texts.enumerate().flat_map(move |(at, id)| {
+        (0..MAX_PARAMETERS).filter(move |i| is_fitted(id, *i)).map(move |i| Unknown::Text(at, i))
+    })
+}
+
+/// How many unknowns effects as text have.
+pub(crate) fn unknowns_of_texts(texts: &[EffectId]) -> usize {
+    unknowns_of(texts.iter()).count()
 }
 
 /// The root x of v = x (1 + κ(x² − ¾)) by Newton's iteration; beyond the circle the slope is taken as on it.

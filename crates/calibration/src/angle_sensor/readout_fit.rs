@@ -1,6 +1,6 @@
 //! The fit of a readout to what is known of it: the angle against the reference, and the radius, which a sensor holds.
 
-use super::readout::{Kind, Readout};
+use super::readout::{Kind, Readout, Unknown};
 use super::samples::SensorRun;
 use crate::numerics::angles::wrapped;
 use crate::numerics::linear::NormalEquations;
@@ -70,15 +70,42 @@ struct Residuals {
     radius: Vec<f64>,
 }
 
-fn residuals(readout: &Readout, runs: &[SensorRun], harmonic_gain: f64, with_angle: bool) -> Residuals {
+/// The readings of some runs with effects as text undone, kept as long as those do not change: their inverse is by iteration.
+struct Undone<'a> {
+    runs: &'a [SensorRun],
+    /// the readout that it was done for last
+    by: Option<Readout>,
+    /// off the rails: readings and references of each run
+    rows: Vec<Vec<([f64; 2], f64)>>,
+}
+
+impl<'a> Undone<'a> {
+    fn new(runs: &'a [SensorRun]) -> Self {
+        Self { runs, by: None, rows: Vec::new() }
+    }
+
+    fn rows(&mut self, readout: &Readout) -> &[Vec<([f64; 2], f64)>] {
+        let kept = self.by.as_ref().is_some_and(|by| by.texts == readout.texts && by.rails == readout.rails);
+        if !kept {
+            let of_run = |run: &SensorRun| {
+                let rows = run.channels().into_iter().flatten().zip(&run.reference_rad);
+                let off_rails = rows.filter(|(z, _)| !readout.rails.clips(**z));
+                off_rails.map(|(z, a)| (readout.without_texts(*z), *a)).collect()
+            };
+            self.rows = self.runs.iter().map(of_run).collect();
+            self.by = Some(readout.clone());
+        }
+        &self.rows
+    }
+}
+
+fn residuals(readout: &Readout, undone: &mut Undone<'_>, harmonic_gain: f64, with_angle: bool) -> Residuals {
     let mut out = Residuals { angle: Vec::new(), radius: Vec::new() };
-    for run in runs {
-        let Some(channels) = run.channels() else { continue };
-        let kept = channels.iter().zip(&run.reference_rad).filter(|(z, _)| !readout.rails.clips(**z));
+    for rows in undone.rows(readout) {
         let (from_angle, from_radius) = (out.angle.len(), out.radius.len());
         let (mut sine, mut cosine) = (0.0, 0.0);
-        for (z, a) in kept {
-            let [x, y] = readout.undo(*z);
+        for (z, a) in rows {
+            let [x, y] = readout.undo_own(*z);
             out.radius.push(0.5 * (x * x + y * y + 1e-18).ln());
             if with_angle {
                 let d = y.atan2(x) - harmonic_gain * a;
@@ -120,12 +147,12 @@ pub(crate) fn fit(
     }
     let mut weights = weighting.weights();
     let mut fitted = ReadoutFit { readout: begun.clone(), cost: 0.0 };
+    let mut undone = Undone::new(runs);
     let rounds = if weighting == Weighting::VarianceComponents { REWEIGHTINGS } else { 1 };
     for _ in 0..rounds {
-        let origin = begun.p;
-        fitted = levenberg_marquardt(fitted.readout, &origin, |r| weighted(r, runs, harmonic_gain, weights))?;
+        fitted = levenberg_marquardt(fitted.readout, &begun, |r| weighted(r, &mut undone, harmonic_gain, weights))?;
         if weighting == Weighting::VarianceComponents {
-            weights = balanced(&residuals(&fitted.readout, runs, harmonic_gain, true));
+            weights = balanced(&residuals(&fitted.readout, &mut undone, harmonic_gain, true));
         }
     }
     fitted.readout.radius = mean_radius(&fitted.readout, runs);
@@ -146,20 +173,25 @@ fn balanced(r: &Residuals) -> [f64; 2] {
     [(radius / angle).clamp(LEAST_WEIGHT, 1.0), (angle / radius).clamp(LEAST_WEIGHT, 1.0)]
 }
 
-fn weighted(readout: &Readout, runs: &[SensorRun], harmonic_gain: f64, weights: [f64; 2]) -> Vec<f64> {
-    let mut r = residuals(readout, runs, harmonic_gain, weights[0] > 0.0);
+fn weighted(readout: &Readout, undone: &mut Undone<'_>, harmonic_gain: f64, weights: [f64; 2]) -> Vec<f64> {
+    let mut r = residuals(readout, undone, harmonic_gain, weights[0] > 0.0);
     r.angle.iter_mut().for_each(|v| *v *= weights[0]);
     r.angle.extend(r.radius.iter().map(|v| v * weights[1]));
     r.angle
 }
 
-/// Levenberg–Marquardt over the parameters of the readout's kind.
+/// Levenberg–Marquardt over the unknowns of a readout, not far from `origin`.
 fn levenberg_marquardt(
     start: Readout,
-    origin: &[f64; super::readout::UNKNOWNS],
-    residuals: impl Fn(&Readout) -> Vec<f64>,
+    origin: &Readout,
+    mut residuals: impl FnMut(&Readout) -> Vec<f64>,
 ) -> Option<ReadoutFit> {
-    let free = start.kind.free();
+    let free = start.free();
+    let within = |unknown: Unknown, value: f64| match unknown {
+        Unknown::Own(i) => value.clamp(origin.p[i] - REACH, origin.p[i] + REACH),
+        // an effect as text has bounds of its own
+        Unknown::Text(..) => value,
+    };
     let squares = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
     let (mut at, mut damping) = (start, DAMPING);
     let mut left = residuals(&at);
@@ -168,9 +200,8 @@ fn levenberg_marquardt(
         let slopes: Vec<Vec<f64>> = free
             .iter()
             .map(|&i| {
-                let mut moved = at.clone();
-                moved.p[i] += DIFFERENCE;
-                residuals(&moved).iter().zip(&left).map(|(a, b)| (a - b) / DIFFERENCE).collect()
+                let (moved, by) = nudged(&at, i);
+                residuals(&moved).iter().zip(&left).map(|(a, b)| (a - b) / by).collect()
             })
             .collect();
         let mut improved = false;
@@ -178,7 +209,7 @@ fn levenberg_marquardt(
             let step = damped_step(&slopes, &left, damping);
             let mut moved = at.clone();
             for (&i, d) in free.iter().zip(&step) {
-                moved.p[i] = (moved.p[i] - d).clamp(origin[i] - REACH, origin[i] + REACH);
+                moved.set(i, within(i, moved.value(i) - d));
             }
             let there = residuals(&moved);
             let next = squares(&there);
@@ -199,6 +230,18 @@ fn levenberg_marquardt(
     }
     let rows = left.len().max(1) as f64;
     cost.is_finite().then_some(ReadoutFit { readout: at, cost: cost / rows })
+}
+
+/// A readout with one unknown moved by a little, inwards from a bound; and by how much.
+fn nudged(readout: &Readout, unknown: Unknown) -> (Readout, f64) {
+    let from = readout.value(unknown);
+    let moved = |by: f64| {
+        let mut moved = readout.clone();
+        moved.set(unknown, from + by);
+        moved
+    };
+    let up = moved(DIFFERENCE);
+    if up.value(unknown) > from { (up, DIFFERENCE) } else { (moved(-DIFFERENCE), -DIFFERENCE) }
 }
 
 fn damped_step(slopes: &[Vec<f64>], left: &[f64], damping: f64) -> Vec<f64> {

@@ -110,7 +110,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         hypothesis.members.sort_by_key(|m| m.id);
         hypothesis.clip = clip(&readout);
     }
-    let mut effects = if neutral { Vec::new() } else { readout_effects(&readout, deviations, &evidence) };
+    let mut effects = if neutral { Vec::new() } else { readout_effects(&readout, &deviations, &evidence) };
     provenance::in_unit(&mut effects, provenance.readout_unit.as_deref());
     let calibration = Calibration { device, hypothesis, provenance };
     warnings.extend(fitted.iter().filter_map(|run| amplitude_that_changes(&readout, run)));
@@ -201,7 +201,7 @@ fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64
         .filter(|kind| *kind < Kind::Cubic || gap < LARGEST_GAP_OF_A_CUBIC_DEG)
         .filter_map(|kind| {
             let losses = losses_of_radius(|fold| fitted(kind, &folds.without(runs, fold)), &folds, runs)?;
-            Some(Candidate { size: kind.free().len(), model: kind, losses, of_radius: None })
+            Some(Candidate { size: kind.free().len(), texts: 0, model: kind, losses, of_radius: None })
         })
         .collect();
     let chosen = choose(&candidates, Tolerance::One).ok_or_else(no_ellipse)?;

@@ -3,13 +3,14 @@
 
 use std::collections::BTreeMap;
 
+use cvg_model::effects::EffectId;
 use rayon::prelude::*;
 
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, cross_validate, losses_of_radius};
 use super::ellipse;
 use super::lines::strongest_and_its_aliases;
 use super::rails::Rails;
-use super::readout::{Kind, Readout};
+use super::readout::{Kind, Readout, unknowns_of_texts};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
 use super::samples::{Reading, SensorRun};
 use super::sensor::Sensor;
@@ -38,8 +39,8 @@ const MOST_LINES: usize = 6;
 /// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
 pub(crate) const VARYING_RATE: f64 = 0.02;
 
-/// A readout as it is fitted.
-pub(crate) type Front = (Kind, Weighting);
+/// A readout as it is fitted: what the library has of it, how angle and radius count, and which effects as text are there.
+pub(crate) type Front = (Kind, Weighting, Vec<EffectId>);
 /// A model: a readout, where there are channels, and a table.
 pub(crate) type Model = (Option<Front>, Shape);
 
@@ -61,6 +62,8 @@ pub(crate) struct Selection<'a> {
     folds: Folds,
     rails: Rails,
     starts: Vec<Readout>,
+    /// effects as text that compete
+    texts: Vec<EffectId>,
     /// what each readout makes of the rows when it is fitted without each fold
     without: BTreeMap<Option<Front>, Option<WithoutFolds>>,
 }
@@ -74,34 +77,44 @@ struct WithoutFolds {
 }
 
 impl<'a> Selection<'a> {
-    pub(crate) fn new(sensor: &'a Sensor, fit_runs: &[SensorRun], rails: Rails, starts: &[Readout]) -> Self {
+    pub(crate) fn new(
+        sensor: &'a Sensor,
+        fit_runs: &[SensorRun],
+        rails: Rails,
+        starts: &[Readout],
+        texts: &[EffectId],
+    ) -> Self {
         let rows: usize = fit_runs.iter().map(SensorRun::len).sum();
         let stride = (rows / ENOUGH_ROWS).max(1);
         let runs: Vec<SensorRun> =
             fit_runs.iter().map(|r| if stride > 1 { r.thinned(stride) } else { r.clone() }).collect();
         let folds = Folds::of(&runs, sensor.gain.abs() * sensor.cycles);
-        Self { sensor, runs, folds, rails, starts: starts.to_vec(), without: BTreeMap::new() }
+        let (starts, texts) = (starts.to_vec(), texts.to_vec());
+        Self { sensor, runs, folds, rails, starts, texts, without: BTreeMap::new() }
     }
 
     /// Chooses a model, and after it a simpler one where that is as good within a wider tolerance; none where there is not
     /// even one to compare.
     pub(crate) fn select(&mut self) -> Vec<Selected> {
         let mut pool = Vec::new();
-        let plain = self.channels().then_some((Kind::Plain, Weighting::Equal));
+        let plain = self.channels().then_some(PLAIN);
         let fronts = if self.channels() { self.readouts(&mut pool) } else { vec![None] };
         let Some(first) = fronts.first() else { return Vec::new() };
         let constant = Shape::constant(self.sensor.free_gain);
-        let raw = self.losses_of(plain, &constant);
-        let motions = self.motions(*first);
+        let raw = self.losses_of(&plain, &constant);
+        let motions = self.motions(first);
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
-        let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(|t| choose(&pool, *t).cloned()).collect();
+        let of_the_library: Vec<_> = pool.iter().filter(|c| c.texts == 0).cloned().collect();
+        // an effect as text that is not chosen has no say in what is
+        let best = |t: &Tolerance| choose(&pool, *t).filter(|c| c.texts > 0).or(choose(&of_the_library, *t)).cloned();
+        let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(best).collect();
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
         let with_lines = |c: Candidate<Model>| {
             let short = short_beside(&c, &pool).map(|short| self.with_lines(short));
             let long = self.with_lines(c);
             let Candidate { model, losses, .. } =
                 short.filter(|short| short.losses.rms() <= long.losses.rms()).unwrap_or(long);
-            Selected { readout_alone: self.losses_of(model.0, &constant), raw: raw.clone(), model, losses }
+            Selected { readout_alone: self.losses_of(&model.0, &constant), raw: raw.clone(), model, losses }
         };
         chosen.into_iter().map(with_lines).collect()
     }
@@ -115,8 +128,8 @@ impl<'a> Selection<'a> {
         chosen
     }
 
-    fn losses_of(&mut self, front: Option<Front>, shape: &Shape) -> Option<Losses> {
-        self.offer(&[front], std::slice::from_ref(shape)).pop().map(|c| c.losses)
+    fn losses_of(&mut self, front: &Option<Front>, shape: &Shape) -> Option<Losses> {
+        self.offer(std::slice::from_ref(front), std::slice::from_ref(shape)).pop().map(|c| c.losses)
     }
 
     fn channels(&self) -> bool {
@@ -124,31 +137,55 @@ impl<'a> Selection<'a> {
     }
 
     /// Every readout with every weighting, without a table and beside one; the best few kinds remain, each with the
-    /// weighting that predicts best.
+    /// weighting that predicts best. Those with effects as text are chosen among themselves, so that they take no other's place.
     fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Vec<Option<Front>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
-        let mut fronts = vec![Some((Kind::Plain, Weighting::Equal))];
+        let mut fronts = vec![Some(PLAIN)];
         if !self.starts.is_empty() {
-            let all = Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| (*k, w)));
-            fronts.extend(all.filter(|(kind, weighting)| kind.is_told_by(*weighting)).map(Some));
+            fronts.extend(self.fitted_fronts().into_iter().map(Some));
         }
         let first = self.offer(&fronts, &coarse);
-        let mut best: BTreeMap<Option<Kind>, (f64, Option<Front>)> = BTreeMap::new();
+        type Sort<'a> = Option<(Kind, &'a [EffectId])>;
+        let mut best: BTreeMap<Sort<'_>, (f64, &Option<Front>)> = BTreeMap::new();
         for c in &first {
-            let least = best.entry(c.model.0.map(|f| f.0)).or_insert((f64::INFINITY, c.model.0));
+            let key = c.model.0.as_ref().map(|(kind, _, texts)| (*kind, texts.as_slice()));
+            let least = best.entry(key).or_insert((f64::INFINITY, &c.model.0));
             if c.losses.rms() < least.0 {
-                *least = (c.losses.rms(), c.model.0);
+                *least = (c.losses.rms(), &c.model.0);
             }
         }
         let mut ranked: Vec<_> = best.into_values().collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-        let finalists: Vec<_> = ranked.into_iter().take(FINALISTS).map(|(_, f)| f).collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
+        let (plain, texts): (Vec<_>, Vec<_>) = ranked.into_iter().partition(|(_, front)| texts_of(front).is_empty());
+        let finalists = plain.into_iter().take(FINALISTS).chain(texts.into_iter().take(FINALISTS));
+        let finalists: Vec<_> = finalists.map(|(_, front)| front.clone()).collect();
         pool.extend(first.into_iter().filter(|c| !finalists.contains(&c.model.0)));
         finalists
     }
 
+    /// Readouts with something to fit, that what they are weighted by tells. Effects as text stand beside gain and skew at
+    /// least, each by itself and all together.
+    fn fitted_fronts(&self) -> Vec<Front> {
+        let kinds = Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| (*k, w)));
+        let told: Vec<_> = kinds.filter(|(kind, weighting)| kind.is_told_by(*weighting)).collect();
+        // the radius alone does not tell what turns the vibration
+        let beside_texts = |(kind, weighting): &&(Kind, Weighting)| {
+            matches!(kind, Kind::Affine | Kind::Cubic) && *weighting != Weighting::Radius
+        };
+        let mut sets: Vec<Vec<EffectId>> = self.texts.iter().map(|t| vec![*t]).collect();
+        if self.texts.len() > 1 {
+            sets.push(self.texts.clone());
+        }
+        let with = |texts: Vec<EffectId>| {
+            let told: Vec<_> = told.iter().filter(beside_texts).copied().collect();
+            told.into_iter().map(move |(kind, weighting)| (kind, weighting, texts.clone()))
+        };
+        let without = told.iter().map(|(kind, weighting)| (*kind, *weighting, Vec::new()));
+        without.chain(sets.into_iter().flat_map(with)).collect()
+    }
+
     /// How the angle follows motion is settled once.
-    fn motions(&mut self, front: Option<Front>) -> Vec<Motion> {
+    fn motions(&mut self, front: &Option<Front>) -> Vec<Motion> {
         let rates: Vec<f64> = self.runs.iter().flat_map(|r| r.rate_rad_s.iter().copied()).collect();
         let fastest = rates.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
         let mean = rates.iter().sum::<f64>() / rates.len() as f64;
@@ -164,7 +201,7 @@ impl<'a> Selection<'a> {
             all.push(Motion::Direction);
         }
         all.extend([Motion::Rate, Motion::RateAndAcceleration]);
-        let trial = self.offer(&[front], &self.shapes(&MOTION_ORDERS, &all, &[]));
+        let trial = self.offer(std::slice::from_ref(front), &self.shapes(&MOTION_ORDERS, &all, &[]));
         match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
             Some(motion) => vec![Motion::None, motion],
@@ -185,37 +222,40 @@ impl<'a> Selection<'a> {
 
     /// Cross-validates every readout with every shape that the rows can carry.
     fn offer(&mut self, fronts: &[Option<Front>], shapes: &[Shape]) -> Vec<Candidate<Model>> {
-        let missing: Vec<_> = fronts.iter().filter(|f| !self.without.contains_key(f)).copied().collect();
-        let fitted: Vec<_> = missing.par_iter().map(|f| (*f, self.fit_without_each_fold(*f))).collect();
+        let missing: Vec<_> = fronts.iter().filter(|f| !self.without.contains_key(f)).cloned().collect();
+        let fitted: Vec<_> = missing.into_par_iter().map(|f| (f.clone(), self.fit_without_each_fold(&f))).collect();
         self.without.extend(fitted);
         let rows: usize = self.runs.iter().map(SensorRun::len).sum();
         let constant = Shape::constant(self.sensor.free_gain).size();
-        let pairs: Vec<(Option<Front>, &Shape)> =
-            fronts.iter().flat_map(|f| shapes.iter().map(move |s| (*f, s))).collect();
+        let pairs: Vec<(&Option<Front>, &Shape)> =
+            fronts.iter().flat_map(|f| shapes.iter().map(move |s| (f, s))).collect();
         pairs
             .into_par_iter()
             .filter_map(|(front, shape)| {
-                let of_readout = front.map_or(0, |f| f.0.free().len());
+                let of_texts = unknowns_of_texts(texts_of(front));
+                let of_readout = front.as_ref().map_or(0, |f| f.0.free().len()) + of_texts;
                 let size = of_readout + shape.size();
                 if !carries(rows, of_readout, shape.size() - constant, self.runs.len() + constant) {
                     return None;
                 }
-                let WithoutFolds { samples, of_radius } = self.without.get(&front)?.as_ref()?;
+                let WithoutFolds { samples, of_radius } = self.without.get(front)?.as_ref()?;
                 // without a readout to fit all folds have the same samples
                 let without = |fold: usize| samples.get(fold.min(samples.len() - 1)).map(Vec::as_slice);
                 let losses = cross_validate(without, &self.folds, shape, self.runs.len(), self.sensor.cycles)?;
-                Some(Candidate { size, model: (front, shape.clone()), losses, of_radius: of_radius.clone() })
+                let (model, texts) = ((front.clone(), shape.clone()), of_texts);
+                Some(Candidate { size, texts, model, losses, of_radius: of_radius.clone() })
             })
             .collect()
     }
 
-    fn fit_without_each_fold(&self, front: Option<Front>) -> Option<WithoutFolds> {
-        let Some((kind, weighting)) = front else {
+    fn fit_without_each_fold(&self, front: &Option<Front>) -> Option<WithoutFolds> {
+        let Some(front) = front else {
             return Some(WithoutFolds { samples: vec![self.sensor.samples(&self.runs, None)], of_radius: None });
         };
+        let (kind, weighting, _) = *front;
         let whole = match kind {
             Kind::Plain => Readout { rails: self.rails, ..Readout::plain() },
-            _ => self.fit_readout(kind, weighting, &self.runs)?.readout,
+            _ => self.fit_readout(front, &self.runs)?.readout,
         };
         let readouts: Vec<Readout> = (0..self.folds.count)
             .map(|fold| {
@@ -231,15 +271,15 @@ impl<'a> Selection<'a> {
         Some(WithoutFolds { samples, of_radius })
     }
 
-    fn fit_readout(&self, kind: Kind, weighting: Weighting, runs: &[SensorRun]) -> Option<ReadoutFit> {
-        fit_from(&self.starts, self.rails, kind, weighting, runs, self.sensor.gain)
+    fn fit_readout(&self, front: &Front, runs: &[SensorRun]) -> Option<ReadoutFit> {
+        fit_from(&self.starts, self.rails, front, runs, self.sensor.gain)
     }
 
     /// The best model with one isolated line more, if it is better by more than a standard error, also than with a line that
     /// looks like it on these stations.
     fn with_a_line(&mut self, chosen: &Candidate<Model>) -> Option<Candidate<Model>> {
         let (front, shape) = &chosen.model;
-        let readout = front.and_then(|(kind, weighting)| self.fit_readout(kind, weighting, &self.runs));
+        let readout = front.as_ref().and_then(|front| self.fit_readout(front, &self.runs));
         let samples = self.sensor.samples(&self.runs, readout.as_ref().map(|f| &f.readout));
         let table = TableFit::new(shape, &samples, self.runs.len(), self.sensor.cycles)?;
         let mut orders: Vec<usize> =
@@ -251,7 +291,7 @@ impl<'a> Selection<'a> {
             .into_iter()
             .filter_map(|line| {
                 let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
-                let all = self.offer(&[*front], &self.shapes(&orders, &[shape.motion], &lines));
+                let all = self.offer(std::slice::from_ref(front), &self.shapes(&orders, &[shape.motion], &lines));
                 choose(&all, Tolerance::One).cloned()
             })
             .collect();
@@ -285,16 +325,25 @@ fn short_beside(chosen: &Candidate<Model>, pool: &[Candidate<Model>]) -> Option<
     (shape.order > ORDER_BESIDE_LINES).then(|| choose(&short, Tolerance::Half).cloned()).flatten()
 }
 
-/// The better of the fits from every start.
+/// The channels as they are.
+const PLAIN: Front = (Kind::Plain, Weighting::Equal, Vec::new());
+
+/// The effects as text of a readout.
+fn texts_of(front: &Option<Front>) -> &[EffectId] {
+    front.as_ref().map_or(&[], |(_, _, texts)| texts)
+}
+
+/// The best of the fits from every start.
 pub(crate) fn fit_from(
     starts: &[Readout],
     rails: Rails,
-    kind: Kind,
-    weighting: Weighting,
+    (kind, weighting, texts): &Front,
     runs: &[SensorRun],
     gain: f64,
 ) -> Option<ReadoutFit> {
-    let fits = starts.iter().filter_map(|s| fit(kind, weighting, runs, gain, &Readout { rails, ..s.clone() }));
+    let onsets = texts.iter().map(|t| t.description().onsets.len()).max().unwrap_or(0).max(1);
+    let begun = starts.iter().flat_map(|s| (0..onsets).map(move |onset| s.with_texts(texts, onset)));
+    let fits = begun.filter_map(|s| fit(*kind, *weighting, runs, gain, &Readout { rails, ..s }));
     fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 

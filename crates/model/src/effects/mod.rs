@@ -516,6 +516,15 @@ impl EffectId {
         true
     }
 
+    /// Whether it is a text that acts after all of the library's on the two channels and asks for nothing but these.
+    pub fn is_of_the_channels(self) -> bool {
+        #[cfg(feature = "written")]
+        if let Self::Written(text) = self {
+            return text.is_of_the_channels();
+        }
+        false
+    }
+
     /// Whether it limits what the drives put out, so that forces are not in proportion to the commands.
     pub fn limits_drives(self) -> bool {
         let d = self.description();

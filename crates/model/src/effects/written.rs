@@ -196,6 +196,14 @@ impl Ord for Written {
 }
 
 impl Written {
+    /// Its expressions ask for nothing but the envelope.
+    pub fn is_of_the_channels(&self) -> bool {
+        use Variable::{Precession, Rate, Table, Time, Warmer};
+        let is_other = |v: &Variable| v.is_of_the_drive() || matches!(v, Precession | Rate | Table | Time | Warmer);
+        let mut steps = self.maps.iter().flat_map(|(_, steps)| *steps);
+        !steps.any(|step| matches!(step, Step::Variable(v) if is_other(v)))
+    }
+
     /// [`Effect::input_rate`](super::Effect::input_rate)
     pub fn input_rate<T: Real>(&self, p: &Values<T>, rate_rad_s: T, at: &Moment<T>) -> T {
         let scope = Scope { p, e: Envelope::zero(), at: *at, rate: rate_rad_s };
