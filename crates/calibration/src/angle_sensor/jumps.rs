@@ -7,8 +7,7 @@
 use crate::data::slips::slips;
 use crate::data::table::{integrated, turned};
 use crate::numerics::angles::unwrapped;
-use crate::numerics::statistics::median;
-use crate::numerics::statistics::span;
+use crate::numerics::statistics::{median, span};
 use crate::recording::Run;
 
 /// Parts of a run whose increments tell how far the angle goes with the reference.

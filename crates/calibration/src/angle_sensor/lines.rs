@@ -6,8 +6,7 @@
 use statrs::function::erf::erfc;
 
 use super::table_fit::{Sample, TableFit, only_phase};
-use crate::numerics::statistics::span;
-use crate::numerics::statistics::{lower_quartile, median};
+use crate::numerics::statistics::{lower_quartile, median, span};
 
 /// False-alarm probability over all lines tried.
 const FALSE_ALARM: f64 = 0.01;

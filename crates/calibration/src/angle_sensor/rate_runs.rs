@@ -5,8 +5,7 @@ use super::samples::{Reading, SensorRun};
 use crate::error::Refusal;
 use crate::numerics::angles::unwrapped;
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::span;
-use crate::numerics::statistics::{median, robust_deviation};
+use crate::numerics::statistics::{median, robust_deviation, span};
 use crate::report::gate::unit;
 
 /// Share of the runs that may be left out.

@@ -5,8 +5,7 @@ use super::samples::{Reading, SensorRun};
 use super::sensor::magnitude;
 use crate::error::Refusal;
 use crate::numerics::angles::unwrapped;
-use crate::numerics::statistics::span;
-use crate::numerics::statistics::{line, median};
+use crate::numerics::statistics::{line, median, span};
 use crate::recording::Run;
 
 /// A unit of an angle and what one is in degrees.

@@ -6,11 +6,9 @@ use cvg_model::effects::EffectId;
 
 use crate::error::Refusal;
 use crate::model::hypothesis::Hypothesis;
-use crate::numerics::angles::unwrapped;
-use crate::numerics::angles::wrapped;
+use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::span;
-use crate::numerics::statistics::{line, median, robust_deviation};
+use crate::numerics::statistics::{line, median, robust_deviation, span};
 use crate::recording::{Instrument, Recording};
 use crate::report::calibration::Calibration;
 use crate::report::gate::unit;
