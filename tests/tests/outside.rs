@@ -36,10 +36,20 @@ fn written(simulated: &Simulated) -> TempDir {
 
 /// The device with `error` (rad) added to its angle in every rotation run.
 fn recorded(settings: Settings, error: impl Fn(&Sample) -> f64) -> TempDir {
+    read_otherwise(settings, |s, e| turned(e, error(s)))
+}
+
+fn turned(e: Envelope<f64>, by: f64) -> Envelope<f64> {
+    let (sin, cos) = by.sin_cos();
+    e.turned(sin, cos)
+}
+
+/// The device with another envelope in the place of what it reads in every rotation run.
+fn read_otherwise(settings: Settings, map: impl Fn(&Sample, Envelope<f64>) -> Envelope<f64>) -> TempDir {
     let mut simulated = scenario(settings).simulate();
     for run in &mut simulated.runs {
         if matches!(run.run, Run::Rotation { .. }) {
-            turn_readout(run, &error);
+            map_readout(run, &map);
         }
     }
     written(&simulated)
@@ -81,7 +91,7 @@ fn fed_back(folder: &TempDir, identified: &Identification) -> Identification {
     identify(campaign, &Options { effects, ..Options::default() }).unwrap()
 }
 
-fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
+fn map_readout(run: &mut SimulatedRun, map: impl Fn(&Sample, Envelope<f64>) -> Envelope<f64>) {
     let column = |name| run.column(name).map(<[f64]>::to_vec);
     let t = column("t_s").unwrap();
     let [xc, xs, yc, ys] =
@@ -98,7 +108,7 @@ fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
             })
             .collect()
     });
-    let turned: Vec<Envelope<f64>> = (0..t.len())
+    let mapped: Vec<Envelope<f64>> = (0..t.len())
         .map(|i| {
             let e = Envelope::new(xc[i], xs[i], yc[i], ys[i]);
             let next = (i + 1).clamp(1, t.len() - 1);
@@ -106,12 +116,11 @@ fn turn_readout(run: &mut SimulatedRun, error: impl Fn(&Sample) -> f64) {
             let theta = e.y_c.atan2(e.x_c);
             let a = e.pendulum().e.sqrt();
             let sample = Sample { rate_rad_s, t_s: t[i], table: table[i].to_radians(), theta, a };
-            let (sin, cos) = error(&sample).sin_cos();
-            e.turned(sin, cos)
+            map(&sample, e)
         })
         .collect();
     for column in &mut run.columns {
-        for (v, e) in column.values.iter_mut().zip(&turned) {
+        for (v, e) in column.values.iter_mut().zip(&mapped) {
             *v = match column.name {
                 "xc_v" => e.x_c,
                 "xs_v" => e.x_s,
@@ -327,6 +336,43 @@ fn a_first_harmonic_that_is_no_offset_is_proposed_without_the_amplitude() {
     let identified = with_error(plain_paper(), |s| SIZE * (s.theta + 0.9).cos());
     is_left_unexplained(&identified, "pattern-harmonic", Some(1));
     is_proposed(&identified, "pattern", Some(1.0), "readout", [Some(0.0), Some(0.0)]);
+}
+
+/// A channel that is not read while its carrier is within ±0.8 mV: the describing function of a dead zone.
+#[test]
+fn a_dead_zone_of_the_readout_is_not_taken_for_a_cubic_and_a_quintic() {
+    const ZONE_V: f64 = 8e-4;
+    let read = |re: f64, im: f64| {
+        let r = (ZONE_V / re.hypot(im)).min(1.0);
+        let share = 1.0 - std::f64::consts::FRAC_2_PI * (r.asin() + r * (1.0 - r * r).sqrt());
+        (re * share, im * share)
+    };
+    let folder = read_otherwise(plain_paper(), |_, e| {
+        let ((x_c, x_s), (y_c, y_s)) = (read(e.x_c, e.x_s), read(e.y_c, e.y_s));
+        Envelope::new(x_c, x_s, y_c, y_s)
+    });
+    let identified = identify_folder(folder.path()).unwrap();
+    is_left_unexplained(&identified, "pattern-harmonic", Some(8));
+    // it goes with 1/a: to first order, and less where the zone is a larger share of the amplitude
+    is_proposed(&identified, "pattern", Some(8.0), "readout", [Some(0.0), None]);
+}
+
+/// θ̇ ∝ |cos θ|: 4θ is one of its harmonics and all that a cubic spring would show.
+#[test]
+fn a_bilinear_spring_is_not_taken_for_a_cubic_one() {
+    let identified = with_error(plain_paper(), |s| 3.0 * SIZE * s.theta.cos().abs() * 8.7 / s.rate_rad_s);
+    is_left_unexplained(&identified, "rate-dependent", Some(6));
+    is_proposed(&identified, "pattern", Some(6.0), "mechanics", [Some(-1.0), Some(0.0)]);
+}
+
+/// Harmonics 1 and 3, which go with the amplitude: one run at another amplitude disagrees with what corrects the rest.
+#[test]
+fn a_product_of_the_channels_is_corrected_where_most_runs_agree() {
+    let folder = read_otherwise(plain_paper(), |_, e| Envelope::new(e.x_c, e.x_s, e.y_c + 2e-3 * e.x_c * e.y_c, e.y_s));
+    let identified = identify_folder(folder.path()).unwrap();
+    is_left_unexplained(&identified, "pattern-harmonic", Some(1));
+    is_left_unexplained(&identified, "pattern-harmonic", Some(3));
+    is_corrected(&identified);
 }
 
 /// What is proposed, fed back, corrects the angle: one kind always, all of them with CVG_TRIALS=7.

@@ -15,6 +15,7 @@ pub(crate) mod model;
 mod rails;
 mod rate_alone;
 pub(crate) mod rate_gyroscope;
+mod rate_regression;
 mod rate_runs;
 mod readout;
 mod readout_fit;

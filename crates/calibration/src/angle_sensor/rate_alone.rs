@@ -3,9 +3,8 @@
 //! A run that turns there and back tells both at once, and what a lag makes beside them is kept out of either. Of a run that
 //! turns one way at one rate they are one number: each is told as it is where the other is that of all runs.
 
-use super::rate_gyroscope::{
-    RateGyroscope, Stretch, T_PARTS, Term, estimate, estimates, jackknife, splits, tell_scale,
-};
+use super::rate_gyroscope::{RateGyroscope, T_PARTS, estimates, jackknife, splits, tell_scale};
+use super::rate_regression::{ErrorLaw, Stretch, Term, estimate};
 use super::samples::SensorRun;
 use crate::report::Estimate;
 
@@ -40,8 +39,9 @@ fn found<const N: usize>(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimat
     if splits.len() < 2 {
         return None;
     }
-    let values = estimate(stretch, terms);
-    let deviations = jackknife(&estimates(stretch, &splits, terms).0, terms.len());
+    let law = ErrorLaw::likelier(stretch, terms);
+    let values = estimate(stretch, terms, law);
+    let deviations = jackknife(&estimates(stretch, &splits, terms, law).0, terms.len());
     Some(std::array::from_fn(|i| {
         let half = T_PARTS * deviations[i];
         Estimate { value: values[i], ci95: [values[i] - half, values[i] + half] }

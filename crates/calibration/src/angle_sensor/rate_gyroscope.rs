@@ -2,9 +2,9 @@
 //!
 //! $$e = b\\,t + s\\,α + l\\,Ω + \text{const}$$
 //!
-//! by least squares of the angle, each run about its own mean. What such a gyroscope is wrong by besides comes of turns about
-//! its other axes, which end where they began as often as not: the error of the angle stays near a line, and a run is held
-//! best by all of its rows. Increments, which would make a random walk white, tell bias and scale factor worse here, and so
+//! of the angle, each run about its own mean, by least squares or by least absolute deviations, whichever law makes the errors
+//! likelier. What such a gyroscope is wrong by besides comes of turns about its other axes, which end where they began as often
+//! as not: the error of the angle stays near a line with excursions from it, and a run is held best by all of its rows. Increments, which would make a random walk white, tell bias and scale factor worse here, and so
 //! does a choice among subsets of the terms by five parts that were left out: it is decided by the one part in which the
 //! others move most. The bias and the scale factor are therefore always estimated where they can be told apart. The lag is a
 //! matter of single turns, and blocks left out in turn say whether it helps. Where all of it shows at one place, as in a run
@@ -12,23 +12,9 @@
 //! instrument.
 
 use super::cross_validation::Folds;
-use super::samples::{Reading, SensorRun};
-use super::selection::VARYING_RATE;
-use super::sensor::{Sensor, centred};
-use crate::numerics::linear::NormalEquations;
-
-/// One of the three terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Term {
-    /// b, rad/s
-    Bias,
-    /// the bias of one run, rad/s
-    BiasOf(usize),
-    /// s, of the reference's angle
-    Scale,
-    /// l, s
-    Lag,
-}
+use super::rate_regression::{ErrorLaw, Row, Stretch, Term, estimate, rows, solved, variance};
+use super::samples::SensorRun;
+use super::sensor::Sensor;
 
 /// A lag is kept where the rms of blocks that were left out in turn falls by at least this share.
 const LEAST_FALL: f64 = 0.01;
@@ -45,101 +31,6 @@ const LEFT_BY_A_PART: f64 = 0.01;
 /// Rows that a part needs to be fitted with.
 const FEWEST_ROWS: usize = 10;
 
-/// A stretch of a run: what is regressed on.
-#[derive(Debug, Clone)]
-pub(super) struct Stretch {
-    run: usize,
-    t: Vec<f64>,
-    reference: Vec<f64>,
-    rate: Vec<f64>,
-    error: Vec<f64>,
-}
-
-impl Stretch {
-    pub(super) fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
-        let Reading::Angle(theta) = &run.reading else { return None };
-        let raw: Vec<f64> = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - sensor.gain * a).collect();
-        let error = centred(&raw, sensor.period);
-        Some(Self {
-            run: number,
-            t: run.t_s.clone(),
-            reference: run.reference_rad.clone(),
-            rate: run.rate_rad_s.clone(),
-            error,
-        })
-    }
-
-    fn part(&self, rows: std::ops::Range<usize>) -> Self {
-        Self {
-            run: self.run,
-            t: self.t[rows.clone()].to_vec(),
-            reference: self.reference[rows.clone()].to_vec(),
-            rate: self.rate[rows.clone()].to_vec(),
-            error: self.error[rows].to_vec(),
-        }
-    }
-
-    fn regressor(&self, term: Term, i: usize) -> f64 {
-        match term {
-            Term::Bias => self.t[i],
-            Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
-            Term::Scale => self.reference[i],
-            Term::Lag => self.rate[i],
-        }
-    }
-
-    /// Whether its rate varies by enough of the fastest one to tell what goes with the rate from what goes with the time.
-    fn varies(&self, fastest: f64) -> bool {
-        variance(&self.rate).sqrt() > VARYING_RATE * fastest
-    }
-
-    /// The same with `values` of `terms` taken out of its error.
-    pub(super) fn without(&self, terms: &[Term], values: &[f64]) -> Self {
-        Self { error: self.left(terms, values), ..self.clone() }
-    }
-
-    /// What `values` of `terms` leave of the error.
-    pub(super) fn left(&self, terms: &[Term], values: &[f64]) -> Vec<f64> {
-        (0..self.error.len())
-            .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
-            .collect()
-    }
-}
-
-fn variance(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).max(1e-16)
-}
-
-/// A row of the regression: regressors and error, each about its stretch's mean.
-type Row = (Vec<f64>, f64);
-
-fn rows(stretches: &[Stretch], terms: &[Term]) -> Vec<Row> {
-    let mut out = Vec::new();
-    for s in stretches {
-        let n = s.error.len();
-        let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
-        let means: Vec<f64> = terms.iter().map(|t| mean(&|i| s.regressor(*t, i))).collect();
-        let middle = mean(&|i| s.error[i]);
-        out.extend((0..n).map(|i| {
-            let row = terms.iter().zip(&means).map(|(t, m)| s.regressor(*t, i) - m).collect();
-            (row, s.error[i] - middle)
-        }));
-    }
-    out
-}
-
-fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -> Vec<f64> {
-    let mut equations = NormalEquations::new(unknowns);
-    rows.for_each(|(row, value)| equations.add(row, *value));
-    equations.solve()
-}
-
-pub(super) fn estimate(stretches: &[Stretch], terms: &[Term]) -> Vec<f64> {
-    solved(rows(stretches, terms).iter(), terms.len())
-}
-
 /// How much of a term stands beside the others, as a sum of squares of its regressor.
 fn beside_the_others(stretches: &[Stretch], terms: &[Term], at: usize) -> f64 {
     let apart = |(mut row, _): Row| {
@@ -152,19 +43,19 @@ fn beside_the_others(stretches: &[Stretch], terms: &[Term], at: usize) -> f64 {
 }
 
 /// Estimates from every split, with a lag of zero where what is left of the runs does not tell one; and whether each tells it.
-pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term]) -> (Vec<Vec<f64>>, bool) {
+pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term], law: ErrorLaw) -> (Vec<Vec<f64>>, bool) {
     let Some(at) = terms.iter().position(|t| *t == Term::Lag) else {
-        return (splits.iter().map(|s| estimate(&s.train, terms)).collect(), true);
+        return (splits.iter().map(|s| estimate(&s.train, terms, law)).collect(), true);
     };
     let least = LEFT_BY_A_PART * beside_the_others(all, terms, at);
     let others: Vec<Term> = terms.iter().copied().filter(|t| *t != Term::Lag).collect();
     let mut told = true;
     let fits = splits.iter().map(|s| {
         if beside_the_others(&s.train, terms, at) > least {
-            return estimate(&s.train, terms);
+            return estimate(&s.train, terms, law);
         }
         told = false;
-        let mut values = estimate(&s.train, &others);
+        let mut values = estimate(&s.train, &others, law);
         values.insert(at, 0.0);
         values
     });
@@ -252,7 +143,8 @@ impl RateGyroscope {
             return None;
         }
         let terms = told(&all, &Folds::interleaved(runs));
-        let (fits, tells_lag) = estimates(&all, &splits, &terms);
+        let law = ErrorLaw::likelier(&all, &terms);
+        let (fits, tells_lag) = estimates(&all, &splits, &terms, law);
         let log_variance = |left: Vec<f64>| variance(&left).ln();
         let loss: Vec<f64> = splits.iter().zip(&fits).map(|(s, v)| log_variance(s.test.left(&terms, v))).collect();
         let raw: Vec<f64> = splits.iter().map(|s| log_variance(s.test.error.clone())).collect();
@@ -261,11 +153,11 @@ impl RateGyroscope {
         let n = gained.len() as f64;
         let scatter = gained.iter().map(|g| (g - mean(&gained)).powi(2)).sum::<f64>() / (n - 1.0);
         let answered = mean(&gained) < HARMS * (scatter / n).sqrt();
-        let mut values = estimate(&all, &terms);
-        let bias_varies = forget_a_bias_that_varies(&all, &terms, &mut values);
+        let mut values = estimate(&all, &terms, law);
+        let bias_varies = forget_a_bias_that_varies(&all, &terms, law, &mut values);
         let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
-        let (every_fit, _) = estimates(&all, &splits, &every);
+        let (every_fit, _) = estimates(&all, &splits, &every, law);
         let tells_scale = terms.iter().position(|t| *t == Term::Scale);
         let scale = tells_scale.filter(|_| answered).map_or(0.0, |i| values[i]);
         let found = terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v, d));
@@ -303,7 +195,7 @@ fn fastest(all: &[Stretch]) -> f64 {
 /// A bias is carried over to another run only where it repeats between runs: where the others' mean predicts a run's
 /// worse than nothing does, it is zero, and the other terms are estimated with each run's own. Beside a scale factor that
 /// asks for a run whose rate varies: at one rate a bias of its own and a scale factor are the same.
-fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], values: &mut [f64]) -> bool {
+fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], law: ErrorLaw, values: &mut [f64]) -> bool {
     let Some(at) = terms.iter().position(|t| *t == Term::Bias).filter(|_| all.len() > 1) else { return false };
     let fastest = fastest(all);
     if terms.contains(&Term::Scale) && !all.iter().any(|s| s.varies(fastest)) {
@@ -311,7 +203,7 @@ fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], values: &mut [f64]
     }
     let biases = all.iter().map(|s| Term::BiasOf(s.run));
     let own: Vec<Term> = biases.chain(terms.iter().copied().filter(|t| *t != Term::Bias)).collect();
-    let found = estimate(all, &own);
+    let found = estimate(all, &own, law);
     let (each, others) = found.split_at(all.len());
     let sum: f64 = each.iter().sum();
     let mean_of_others = |b: f64| (sum - b) / (each.len() - 1) as f64;
@@ -340,6 +232,7 @@ pub(super) fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::angle_sensor::samples::Reading;
     use crate::recording::Role;
 
     /// Turned there and back at a constant rate: 2 % of scale factor and a bias.

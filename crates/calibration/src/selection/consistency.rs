@@ -22,7 +22,8 @@ use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, restore, val
 const TOLERATED_SHARE: f64 = 0.15;
 /// What the noise of a run allows, in standard deviations.
 const TOLERATED_DEVIATIONS: f64 = 5.0;
-/// A harmonic without a cause at least this large beside an effect at the same harmonic makes one cause of both likelier.
+/// A harmonic without a cause at least this large beside an effect, at the same harmonic or as an overtone of the same shape,
+/// makes one cause of both likelier.
 const SHARED_HARMONIC: f64 = 0.1;
 /// What a cause does to the angle, beside the error that is left there.
 const SMALLEST_CLAIM: f64 = 0.3;
@@ -36,18 +37,19 @@ struct Share {
     deviation: f64,
 }
 
-/// What an effect does to the angle of the fitted runs.
+/// What effects do to the angle of the fitted runs together.
 struct Contribution {
     with: Evaluation,
-    /// the angle without the effect less that with it
+    /// the angle without the effects less that with them
     change: Evaluation,
 }
 
 impl Contribution {
-    fn new(dataset: &Dataset, fit: &Fit, member: usize) -> Self {
+    fn of(dataset: &Dataset, fit: &Fit, members: &[usize]) -> Self {
         let with = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None);
         let mut reduced = fit.hypothesis.clone();
-        reduced.members.remove(member);
+        let mut at = 0..;
+        reduced.members.retain(|_| at.next().is_some_and(|at| !members.contains(&at)));
         let mut change = evaluate(&dataset.tracks, &reduced, &fit.starts, Role::Fit, Window::Whole, Some(&with));
         for (without, with) in change.segments.iter_mut().zip(&with.segments) {
             for (a, b) in without.angle.iter_mut().zip(&with.angle) {
@@ -177,7 +179,7 @@ pub(super) fn rival_that_explains(
 
 /// Why member `member` cannot be claimed as a cause, if the runs contradict it.
 fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> {
-    let contribution = Contribution::new(dataset, fit, member);
+    let contribution = Contribution::of(dataset, fit, &[member]);
     if contribution.rms() < SMALLEST_CLAIM * contribution.with.mean_square().sqrt() {
         return Some("it does too little to be recognised".into());
     }
@@ -188,13 +190,73 @@ fn inconsistency(dataset: &Dataset, fit: &Fit, member: usize) -> Option<String> 
     if let Some(s) = contradicting {
         return Some(format!("{} shows {:.2} ± {:.2} of it", s.run, s.value, s.deviation));
     }
-    let harmonic = contribution.harmonic();
-    let (other, m) = fit.hypothesis.members.iter().enumerate().find(|(_, m)| {
-        m.origin == Origin::Empirical
-            && m.id == EffectId::HarmonicN
-            && harmonic.is_some_and(|n| (m.values[0] - f64::from(n)).abs() < 0.5)
-    })?;
-    let size = Contribution::new(dataset, fit, other).rms();
-    (size > SHARED_HARMONIC * contribution.rms())
-        .then(|| format!("another part of harmonic {} has no known cause", m.values[0]))
+    let claimed = contribution.harmonic()?;
+    // of causes at one harmonic that cancel in part, what they do together
+    let claim = Contribution::of(dataset, fit, &library_effects_at(dataset, fit, claimed)).rms();
+    let unnamed = harmonics_without_a_cause(dataset, fit, SHARED_HARMONIC * claim);
+    if unnamed.contains(&claimed) {
+        return Some(format!("another part of harmonic {claimed} has no known cause"));
+    }
+    let [next, after] = series(claimed, &unnamed)?;
+    Some(format!(
+        "harmonics {next} and {after}, which have no known cause, go on from its harmonic {claimed}: one shape makes all of them"
+    ))
+}
+
+/// The effects of the library that discovery added at a harmonic of the pattern, those that turned out to be descriptions as well.
+fn library_effects_at(dataset: &Dataset, fit: &Fit, harmonic: u32) -> Vec<usize> {
+    (0..fit.hypothesis.members.len())
+        .filter(|&at| fit.hypothesis.members[at].origin != Origin::Declared)
+        .filter(|&at| !fit.hypothesis.members[at].id.description().empirical)
+        .filter(|&at| Contribution::of(dataset, fit, &[at]).harmonic() == Some(harmonic))
+        .collect()
+}
+
+/// Harmonics of the pattern that are corrected without a known cause and are at least this large, rad rms.
+fn harmonics_without_a_cause(dataset: &Dataset, fit: &Fit, least: f64) -> Vec<u32> {
+    let members = fit.hypothesis.members.iter().enumerate();
+    members
+        .filter(|(_, m)| m.origin == Origin::Empirical && m.id == EffectId::HarmonicN)
+        .filter(|(at, _)| Contribution::of(dataset, fit, &[*at]).rms() > least)
+        .map(|(_, m)| {
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "orders are searched from 0 to 720"
+            )]
+            let order = m.values[0].round() as u32;
+            order
+        })
+        .collect()
+}
+
+/// The two harmonics among `unnamed` that follow `claimed` in a series of overtones, the multiples of one of its
+/// divisors. What the library's effects do to the angle is one harmonic; a dead zone or a kink makes a series.
+fn series(claimed: u32, unnamed: &[u32]) -> Option<[u32; 2]> {
+    (1..=claimed)
+        .filter(|step| claimed % step == 0)
+        .map(|step| [claimed + step, claimed + 2 * step])
+        .find(|overtones| overtones.iter().all(|n| unnamed.contains(n)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dead_zone_is_a_series_of_every_fourth_harmonic() {
+        assert_eq!(series(4, &[8, 12, 16]), Some([8, 12]));
+    }
+
+    #[test]
+    fn a_kink_is_a_series_of_every_second_harmonic() {
+        assert_eq!(series(4, &[6, 8]), Some([6, 8]));
+    }
+
+    #[test]
+    fn a_gap_ends_a_series() {
+        assert_eq!(series(4, &[8, 16]), None);
+        assert_eq!(series(4, &[7, 10]), None);
+        assert_eq!(series(0, &[1, 2]), None);
+    }
 }

@@ -37,7 +37,7 @@ pub(crate) fn last_step(
         let Some(refined) = refined(dataset, fitted) else {
             return Ok(of_blocks(dataset, &fitted.fit));
         };
-        let Some((member, step)) = insignificant(&refined, steps) else {
+        let Some((member, step)) = least_significant(&refined, steps) else {
             let covariance = settled(dataset, fitted, refined);
             return Ok(doubted(&fitted.fit, steps, covariance));
         };
@@ -67,24 +67,28 @@ fn refined(dataset: &mut Dataset, fitted: &Fitted) -> Option<Refined> {
     step(dataset)
 }
 
-/// The least significant member that discovery added, and its step, where coloured noise and the runs' disagreement
-/// explain it as well: where its gain in 2 ln likelihood, after the price of its parameters, is less than discovery asks for.
-fn insignificant(refined: &Refined, steps: &[Accepted]) -> Option<(usize, usize)> {
+/// The least significant member that discovery added, and its step, where its gain in 2 ln likelihood, after the price of its
+/// parameters, is less than discovery asks for. What has no cause has to exceed coloured noise, and corrects what the runs share;
+/// a cause has to exceed what the runs disagree by as well.
+fn least_significant(refined: &Refined, steps: &[Accepted]) -> Option<(usize, usize)> {
     let hypothesis = &refined.fit.hypothesis;
+    let gain = |at: usize| {
+        let empirical = hypothesis.members[at].id.description().empirical;
+        significance(&refined.fit, if empirical { &refined.fit.covariance } else { &refined.covariance }, at)
+    };
     (0..hypothesis.members.len())
-        .filter_map(|at| Some((significance(refined, at)?, at, step_of(hypothesis, at, steps)?)))
+        .filter_map(|at| Some((gain(at)?, at, step_of(hypothesis, at, steps)?)))
         .filter(|(gain, ..)| *gain < LEAST_GAIN)
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, at, step)| (at, step))
 }
 
-/// What a member gains in 2 ln likelihood over its absence (Wald 1943), less ln n for each of its parameters; `None`
-/// where none of them is fitted.
-fn significance(refined: &Refined, at: usize) -> Option<f64> {
-    let member = &refined.fit.hypothesis.members[at];
+/// What a member gains in 2 ln likelihood over its absence (Wald 1943) under a covariance of the unknowns, less ln n for each of
+/// its parameters; `None` where none of them is fitted.
+fn significance(fit: &Fit, covariance: &DMatrix<f64>, at: usize) -> Option<f64> {
+    let member = &fit.hypothesis.members[at];
     let parameters = member.id.description().parameters;
-    let own: Vec<(usize, f64)> = refined
-        .fit
+    let own: Vec<(usize, f64)> = fit
         .unknowns
         .iter()
         .enumerate()
@@ -99,9 +103,9 @@ fn significance(refined: &Refined, at: usize) -> Option<f64> {
     if own.is_empty() {
         return None;
     }
-    let block = DMatrix::from_fn(own.len(), own.len(), |i, j| refined.covariance[(own[i].0, own[j].0)]);
+    let block = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i].0, own[j].0)]);
     let value = DVector::from_iterator(own.len(), own.iter().map(|(_, v)| *v));
-    let n = (refined.fit.counted[0] as f64).max(2.0);
+    let n = (fit.counted[0] as f64).max(2.0);
     Some(value.dot(&(scaled_inverse(&block, 0.0)? * &value)) - own.len() as f64 * n.ln())
 }
 

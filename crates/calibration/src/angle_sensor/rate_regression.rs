@@ -1,0 +1,240 @@
+//! The regression of a rate gyroscope's angle on bias, scale factor and lag, under the law that its errors follow.
+
+use super::samples::{Reading, SensorRun};
+use super::selection::VARYING_RATE;
+use super::sensor::{Sensor, centred};
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::{median, robust_deviation};
+
+/// One of the three terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Term {
+    /// b, rad/s
+    Bias,
+    /// the bias of one run, rad/s
+    BiasOf(usize),
+    /// s, of the reference's angle
+    Scale,
+    /// l, s
+    Lag,
+}
+
+/// How the errors of the angle are distributed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ErrorLaw {
+    /// noise and slow wander: least squares
+    Normal,
+    /// excursions that come and go, as turns about the other axes make: least absolute deviations
+    Laplace,
+}
+
+/// Reweighted fits of least absolute deviations, and the smallest deviation that weighs, of the robust one (Schlossmacher 1973).
+const REWEIGHTED: usize = 30;
+const SMALLEST_DEVIATION: f64 = 1e-2;
+
+/// A stretch of a run: what is regressed on.
+#[derive(Debug, Clone)]
+pub(super) struct Stretch {
+    pub(super) run: usize,
+    t: Vec<f64>,
+    reference: Vec<f64>,
+    pub(super) rate: Vec<f64>,
+    pub(super) error: Vec<f64>,
+}
+
+impl Stretch {
+    pub(super) fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
+        let Reading::Angle(theta) = &run.reading else { return None };
+        let raw: Vec<f64> = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - sensor.gain * a).collect();
+        let error = centred(&raw, sensor.period);
+        Some(Self {
+            run: number,
+            t: run.t_s.clone(),
+            reference: run.reference_rad.clone(),
+            rate: run.rate_rad_s.clone(),
+            error,
+        })
+    }
+
+    pub(super) fn part(&self, rows: std::ops::Range<usize>) -> Self {
+        Self {
+            run: self.run,
+            t: self.t[rows.clone()].to_vec(),
+            reference: self.reference[rows.clone()].to_vec(),
+            rate: self.rate[rows.clone()].to_vec(),
+            error: self.error[rows].to_vec(),
+        }
+    }
+
+    fn regressor(&self, term: Term, i: usize) -> f64 {
+        match term {
+            Term::Bias => self.t[i],
+            Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
+            Term::Scale => self.reference[i],
+            Term::Lag => self.rate[i],
+        }
+    }
+
+    /// Whether its rate varies by enough of the fastest one to tell what goes with the rate from what goes with the time.
+    pub(super) fn varies(&self, fastest: f64) -> bool {
+        variance(&self.rate).sqrt() > VARYING_RATE * fastest
+    }
+
+    /// The same with `values` of `terms` taken out of its error.
+    pub(super) fn without(&self, terms: &[Term], values: &[f64]) -> Self {
+        Self { error: self.left(terms, values), ..self.clone() }
+    }
+
+    /// What `values` of `terms` leave of the error.
+    pub(super) fn left(&self, terms: &[Term], values: &[f64]) -> Vec<f64> {
+        (0..self.error.len())
+            .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
+            .collect()
+    }
+}
+
+pub(super) fn variance(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).max(1e-16)
+}
+
+/// A row of the regression: regressors and error, each about its stretch's mean.
+pub(super) type Row = (Vec<f64>, f64);
+
+pub(super) fn rows(stretches: &[Stretch], terms: &[Term]) -> Vec<Row> {
+    weighted_rows(stretches, terms, |_| 1.0)
+}
+
+/// Rows times the roots of their weights, about the weighted means of their stretches.
+fn weighted_rows(stretches: &[Stretch], terms: &[Term], weight: impl Fn(usize) -> f64) -> Vec<Row> {
+    let mut out = Vec::new();
+    let mut first = 0;
+    for s in stretches {
+        let n = s.error.len();
+        let weights: Vec<f64> = (first..first + n).map(&weight).collect();
+        let all: f64 = weights.iter().sum();
+        let mean = |f: &dyn Fn(usize) -> f64| weights.iter().enumerate().map(|(i, w)| w * f(i)).sum::<f64>() / all;
+        let means: Vec<f64> = terms.iter().map(|t| mean(&|i| s.regressor(*t, i))).collect();
+        let middle = mean(&|i| s.error[i]);
+        out.extend(weights.iter().enumerate().map(|(i, w)| {
+            let row = terms.iter().zip(&means).map(|(t, m)| w.sqrt() * (s.regressor(*t, i) - m)).collect();
+            (row, w.sqrt() * (s.error[i] - middle))
+        }));
+        first += n;
+    }
+    out
+}
+
+pub(super) fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -> Vec<f64> {
+    let mut equations = NormalEquations::new(unknowns);
+    rows.for_each(|(row, value)| equations.add(row, *value));
+    equations.solve()
+}
+
+/// The most likely values of the terms.
+pub(super) fn estimate(stretches: &[Stretch], terms: &[Term], law: ErrorLaw) -> Vec<f64> {
+    let mut values = solved(rows(stretches, terms).iter(), terms.len());
+    if law == ErrorLaw::Normal {
+        return values;
+    }
+    for _ in 0..REWEIGHTED {
+        let left = about_their_medians(stretches, terms, &values);
+        let least = SMALLEST_DEVIATION * robust_deviation(left.iter().copied());
+        if least <= 0.0 {
+            break;
+        }
+        values = solved(weighted_rows(stretches, terms, |i| least / left[i].abs().max(least)).iter(), terms.len());
+    }
+    values
+}
+
+/// What values of the terms leave of the error, about the median of each stretch.
+fn about_their_medians(stretches: &[Stretch], terms: &[Term], values: &[f64]) -> Vec<f64> {
+    let about = |s: &Stretch| {
+        let left = s.left(terms, values);
+        let middle = median(&mut left.clone());
+        left.into_iter().map(move |r| r - middle)
+    };
+    stretches.iter().flat_map(about).collect()
+}
+
+impl ErrorLaw {
+    /// The likelier of the two for what the terms leave.
+    pub(super) fn likelier(stretches: &[Stretch], terms: &[Term]) -> Self {
+        use std::f64::consts::{E, PI};
+        let least_squares = estimate(stretches, terms, Self::Normal);
+        let squares: Vec<f64> = rows(stretches, terms)
+            .iter()
+            .map(|(row, error)| (error - row.iter().zip(&least_squares).map(|(a, b)| a * b).sum::<f64>()).powi(2))
+            .collect();
+        let absolute = about_their_medians(stretches, terms, &estimate(stretches, terms, Self::Laplace));
+        let n = squares.len().max(1) as f64;
+        // mean log-likelihoods at the most likely scale
+        let normal = -0.5 * (2.0 * PI * E * squares.iter().sum::<f64>() / n).ln();
+        let laplace = -(2.0 * E * absolute.iter().map(|r| r.abs()).sum::<f64>() / n).ln();
+        if laplace > normal { Self::Laplace } else { Self::Normal }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::statistics::remembered;
+    use crate::recording::Role;
+
+    const BIAS_RAD_S: f64 = 1e-3;
+
+    /// A gyroscope at rest with a bias and `error`, rad.
+    fn at_rest(error: &[f64]) -> [Stretch; 1] {
+        let t_s: Vec<f64> = (0..error.len()).map(|i| i as f64 * 0.1).collect();
+        let run = SensorRun {
+            name: "rest".into(),
+            number: 0,
+            role: Role::Fit,
+            commanded: false,
+            rate_rad_s: vec![0.0; error.len()],
+            acceleration_rad_s2: vec![0.0; error.len()],
+            reading: Reading::Angle(t_s.iter().zip(error).map(|(t, e)| BIAS_RAD_S * t + e).collect()),
+            reference_rad: vec![0.0; error.len()],
+            t_s,
+        };
+        let sensor =
+            Sensor::new(Some(1.0), std::f64::consts::TAU, std::slice::from_ref(&run)).expect("a gain is stated");
+        [Stretch::new(&run, 0, &sensor).expect("it reads an angle")]
+    }
+
+    #[test]
+    fn normal_noise_asks_for_least_squares() {
+        for seed in 1..20 {
+            let noise = remembered(0.0, 1_000, seed);
+            assert_eq!(
+                ErrorLaw::likelier(&at_rest(&noise.iter().map(|e| 1e-3 * e).collect::<Vec<_>>()), &[Term::Bias]),
+                ErrorLaw::Normal
+            );
+        }
+    }
+
+    #[test]
+    fn excursions_do_not_move_the_line_through_most_rows() {
+        let mut error: Vec<f64> = remembered(0.0, 1_000, 7).iter().map(|e| 1e-4 * e).collect();
+        // a turn about another axis and back, in the last fifth
+        error[820..960].iter_mut().for_each(|e| *e += 0.02);
+        let all = at_rest(&error);
+        assert_eq!(ErrorLaw::likelier(&all, &[Term::Bias]), ErrorLaw::Laplace);
+        let off = |law| (estimate(&all, &[Term::Bias], law)[0] - BIAS_RAD_S).abs();
+        assert!(off(ErrorLaw::Laplace) < 2e-6, "{:e}", off(ErrorLaw::Laplace));
+        assert!(off(ErrorLaw::Normal) > 1e-4, "{:e}", off(ErrorLaw::Normal));
+    }
+
+    #[test]
+    fn runs_have_levels_of_their_own() {
+        let mut runs = [at_rest(&vec![0.0; 300]), at_rest(&vec![5.0; 300])].concat();
+        for (i, run) in runs.iter_mut().enumerate() {
+            run.error.iter_mut().zip(remembered(0.0, 300, 3 + i as u64)).for_each(|(e, n)| *e += 1e-5 * n);
+        }
+        for law in [ErrorLaw::Normal, ErrorLaw::Laplace] {
+            assert!((estimate(&runs, &[Term::Bias], law)[0] - BIAS_RAD_S).abs() < 1e-6, "{law:?}");
+        }
+    }
+}
