@@ -234,7 +234,7 @@ fn harmonics_without_a_cause(dataset: &Dataset, fit: &Fit, least: f64) -> Vec<u3
 /// divisors. What the library's effects do to the angle is one harmonic; a dead zone or a kink makes a series.
 fn series(claimed: u32, unnamed: &[u32]) -> Option<[u32; 2]> {
     (1..=claimed)
-        .filter(|step| claimed % step == 0)
+        .filter(|step| claimed.is_multiple_of(*step))
         .map(|step| [claimed + step, claimed + 2 * step])
         .find(|overtones| overtones.iter().all(|n| unnamed.contains(n)))
 }
