@@ -71,4 +71,6 @@ pub struct Instrument<T> {
     delay_s: T,
     per_window_s: T,
     hold: Heading<T>,
+    /// the mode in which nearly every window takes the shortest way: where drives have a phase none does, as none goes on in a fault
+    shortest: Mode,
 }

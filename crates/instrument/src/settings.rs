@@ -2,7 +2,7 @@
 
 use core::f64::consts::{FRAC_PI_4, PI, SQRT_2, TAU};
 
-use cvg_controller::{ActuationCompensation, Allocation, Heading, Pi, RateLoop, Supervisor, SupervisorSettings};
+use cvg_controller::{ActuationCompensation, Allocation, Heading, Mode, Pi, RateLoop, Supervisor, SupervisorSettings};
 use cvg_estimator::{Compensation, Demodulator, Oscillator, PhaseLock, Precession};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Values};
 use cvg_model::{Float, Real};
@@ -250,6 +250,7 @@ impl<T: Float> Instrument<T> {
             });
         }
         let (delay_sin, delay_cos) = Real::sin_cos(omega * delay_s);
+        let allocation = Allocation::new(actuation, t(limit_v))?;
         Ok(Self {
             oscillator,
             demodulator,
@@ -259,7 +260,8 @@ impl<T: Float> Instrument<T> {
             energy: pi(s.energy)?,
             quadrature: pi(s.quadrature)?,
             rate,
-            allocation: Allocation::new(actuation, t(limit_v))?,
+            shortest: if allocation.turns() { Mode::Fault } else { Mode::WholeAngle },
+            allocation,
             supervisor: Supervisor::new(&s.supervisor())?,
             most_unseen: most_unseen(s.fastest_rad_s * window_s),
             energy_set_v2: t(s.amplitude_v * s.amplitude_v),

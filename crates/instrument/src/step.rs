@@ -136,8 +136,8 @@ impl<T: Float> Instrument<T> {
         state.seen.compensated = vibration;
         let p = vibration.pendulum();
         if self.supervisor.goes_on(&state.supervisor, &p) {
-            if state.supervisor.mode == Mode::Hold {
-                return self.go_on_held(state, cos, sin);
+            if state.supervisor.mode != self.shortest {
+                return self.go_on_in_full(state, cos, sin);
             }
             if let Some(out) = self.steadily::<false>(state, &vibration, &p, cos, sin) {
                 return out;
@@ -146,8 +146,9 @@ impl<T: Float> Instrument<T> {
         self.otherwise(state, Suspicion::default(), cos, sin)
     }
 
+    /// Where the rate loop runs as well, or a phase of the drives is undone.
     #[inline(never)]
-    fn go_on_held(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
+    fn go_on_in_full(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
         let e = state.seen.compensated;
         match self.steadily::<true>(state, &e, &e.pendulum(), cos, sin) {
             Some(out) => out,
@@ -160,7 +161,7 @@ impl<T: Float> Instrument<T> {
     /// The control step of nearly every window, in whole-angle mode or hold: nothing is amiss, nothing at a limit. None, and
     /// nothing changed, elsewhere; [`Instrument::control`] does the same at every window.
     #[inline(always)]
-    fn steadily<const HOLD: bool>(
+    fn steadily<const FULL: bool>(
         &self,
         state: &mut State<T>,
         e: &Envelope<T>,
@@ -175,14 +176,15 @@ impl<T: Float> Instrument<T> {
         }
         let v_as = self.energy.energy_within(&mut energy, p.e, self.energy_set_v2)?;
         let v_qc = self.quadrature.quadrature_within(&mut quadrature, p.q)?;
-        let v_qs = if HOLD { self.rate.step(&mut rate, p, &self.hold).volts } else { T::zero() };
+        let hold = FULL && state.supervisor.mode == Mode::Hold;
+        let v_qs = if hold { self.rate.step(&mut rate, p, &self.hold).volts } else { T::zero() };
         let correction_rad_s = self.phase.step_within(&mut lock, p)?;
         let now = major_axis_of(e, precession.cos_2, precession.sin_2);
         if now.status != Measured::Valid {
             return None;
         }
         let then = self.precession.ahead(&precession, &now);
-        let forces = if HOLD {
+        let forces = if FULL {
             let commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: T::zero() };
             self.allocation.step_within(&commands, then.cos, then.sin)?
         } else {
@@ -203,7 +205,7 @@ impl<T: Float> Instrument<T> {
         // all that there is to see in such a window
         state.continuity.unseen = 0;
         (state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);
-        if HOLD {
+        if FULL {
             state.rate = rate;
         }
         state.drive = drive;
