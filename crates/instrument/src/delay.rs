@@ -52,3 +52,15 @@ impl<T: Float> Delay<T> {
         (self.cos - self.sin * more, self.sin + self.cos * more)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Delay;
+
+    #[test]
+    fn a_correction_turns_less_than_a_radian_in_the_delay() {
+        for (limit_rad_s, accepted) in [(1.0, true), (1.999, true), (2.0, false), (2.1, false)] {
+            assert_eq!(Delay::<f32>::new(0.5, 1e5, limit_rad_s).is_ok(), accepted, "{limit_rad_s}");
+        }
+    }
+}
