@@ -82,6 +82,9 @@ table! {
     /// Cubic readout undone
     CUBIC_INVERSE: "unread ∘ read, cubic readout", 2e-15, 1e-6,
         "of a: Newton's iteration ends at the rounding of two cubics and two products";
+    /// the tracker's unit vector
+    UNIT_VECTOR: "the tracker's unit vector", 1e-15, 5e-7,
+        "of 1: two squares, a sum, a root, a quotient and a product: below 4 ε";
     /// the oscillator's phasor one sample later
     NEXT_PHASOR: "the phasor of the next sample", 2.4e-16, 1.29e-7,
         "of a phasor and a step of length 1: two products and their sum, each rounded once: ε, and the room of a box";

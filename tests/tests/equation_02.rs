@@ -145,8 +145,16 @@ fn a_vibration_ahead_of_the_reference_has_negative_l() {
 fn snapshot_of_the_variables_around_a_turn() {
     let mut table = String::from("theta_deg      E      Q      R      S      L\n");
     for theta_deg in [-90.0, -60.0, -45.0, 0.0, 30.0, 45.0, 90.0, 135.0, 180.0_f64] {
-        let p = Orbit { a: 1.0, q: 0.2, theta: theta_deg.to_radians(), delta: 0.1 }.envelope().pendulum();
-        let row = [p.e, p.q, p.r, p.s, p.l].map(|v| format!("{v:7.3}").replace("-0.000", " 0.000"));
+        let (a, q, theta, delta): (f64, f64, f64, f64) = (1.0, 0.2, theta_deg.to_radians(), 0.1);
+        let p = Orbit { a, q, theta, delta }.envelope().pendulum();
+        // of the axes and the angles of the ellipse
+        let along = a * a - q * q;
+        let (sin_2, cos_2) = (2.0 * theta).sin_cos();
+        let expected = [a * a + q * q, 2.0 * a * q, along * cos_2, along * sin_2, -along * (2.0 * delta).sin()];
+        for (variable, expected) in [p.e, p.q, p.r, p.s, p.l].into_iter().zip(expected) {
+            approx::assert_abs_diff_eq!(variable, expected, epsilon = 1e-14);
+        }
+        let row = expected.map(|v| format!("{v:7.3}").replace("-0.000", " 0.000"));
         table += &format!("{theta_deg:9}{}\n", row.concat());
     }
     insta::assert_snapshot!(table);

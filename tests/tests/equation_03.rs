@@ -183,7 +183,7 @@ proptest! {
     /// Every positive gain and integration time, given here as bandwidth and damping of the loop.
     #[test]
     fn prop_the_closed_loops_settle_at_the_set_energy_and_at_no_quadrature(
-        bandwidth in 1.0..50.0_f64, damping in 0.2..3.0_f64, a in 0.7..1.3_f64, q in -0.2..0.2_f64,
+        bandwidth in 1.0..50.0_f64, damping in 0.1..5.0_f64, a in 0.7..1.3_f64, q in -0.2..0.2_f64,
         theta in -1.5..1.5_f64, theta_omega in -1.5..1.5_f64,
     ) {
         let controlled = Loop::new(bandwidth, damping, theta_omega);
@@ -191,10 +191,11 @@ proptest! {
         let start = Orbit { a, q: a * q, theta, delta: 0.0 }.envelope();
         let (e, v) = controlled.run(start, 15.0 * slowest_s);
         let p = e.pendulum();
-        prop_assert_near!(p.e, 1.0, 1e-3);
-        prop_assert_near!(p.q, 0.0, 1e-3);
-        // v_as = −2ωa/(τG_A) < 0: it makes up for the damping, to a hundredth of it
-        prop_assert_near!(v.v_as, -1.0 / 22.0, 1e-2 / 22.0);
+        // after 15 of its slowest times e⁻¹⁵ = 3e-7 of the start is left; the split still turns the pattern under the quadrature
+        prop_assert_near!(p.e, 1.0, 1e-6);
+        prop_assert_near!(p.q, 0.0, 2e-5);
+        // v_as = −2ωa/(τG_A) < 0: it makes up for the damping
+        prop_assert_near!(v.v_as, -1.0 / 22.0, 1e-4 / 22.0);
     }
 }
 

@@ -170,8 +170,12 @@ fn snapshot_of_the_angle_over_orientation_and_quadrature() {
         let row = shares.map(|q| {
             let orbit = Orbit { a: 1.0, q, theta: f64::from(theta_deg).to_radians(), delta: 0.2 };
             let angle = orbit.envelope().pendulum().angle().to_degrees();
-            // the two ends of the range are one state
-            let angle = if angle < -89.999 { angle + 180.0 } else { angle };
+            // the orientation, in whole degrees within a quarter turn: of the two ends of the range, which are one state, the upper
+            let expected = f64::from(90 - (90 - theta_deg).rem_euclid(180));
+            let off = (angle - expected + 90.0).rem_euclid(180.0) - 90.0;
+            approx::assert_abs_diff_eq!(off, 0.0, epsilon = 1e-12);
+            assert!(angle.abs() <= 90.0, "{angle}");
+            let angle = expected;
             format!("{angle:12.3}").replace("-0.000", " 0.000")
         });
         table += &format!("{theta_deg:9}{}\n", row.concat());

@@ -124,8 +124,12 @@ fn snapshot_of_the_ratio_over_mismatch_and_anisodamping() {
             let (tau_0, v_0) = held_at(0.0, &resonator, &drive, 1.0);
             let (tau_90, v_90) = held_at(FRAC_PI_2, &resonator, &drive, 1.0);
             let found = actuation_gain_ratio(tau_0, v_0, tau_90, v_90);
+            approx::assert_relative_eq!(found, ratio, max_relative = 1e-13);
+            // more damping along X takes more of the drive of X, a stronger drive less
+            let outputs = ratio * (1.0 - anisodamping) / (1.0 + anisodamping);
+            approx::assert_relative_eq!(v_90 / v_0, outputs, max_relative = 1e-13);
             let anisodamping = format!("{:20.5}", anisodamping * 2.0 / 22.0);
-            table += &format!("{ratio:9.4}{anisodamping}{:10.4}{found:7.4}\n", v_90 / v_0);
+            table += &format!("{ratio:9.4}{anisodamping}{outputs:10.4}{ratio:7.4}\n");
         }
     }
     insta::assert_snapshot!(table);

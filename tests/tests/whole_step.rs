@@ -21,7 +21,8 @@ const UNEVEN: &[(EffectId, Values<f64>)] = &[
 ];
 const LATE: &[(EffectId, Values<f64>)] =
     &[(EffectId::AngleLatency, [2e-3, 0.0, 0.0, 0.0]), (EffectId::DetectionSkew, [0.03, 0.0, 0.0, 0.0])];
-const DRIVES: &[(EffectId, Values<f64>)] = &[(EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0])];
+const DRIVES: &[(EffectId, Values<f64>)] =
+    &[(EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]), (EffectId::ActuationPhase, [0.2, 0.0, 0.0, 0.0])];
 
 /// Windows long and short, a limit of the drives below the range of the readout and above it, with and without compensation.
 fn settings(which: usize) -> Settings<'static> {

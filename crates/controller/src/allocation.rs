@@ -116,6 +116,8 @@ impl<T: Float> ActuationCompensation<T> {
 pub struct Allocation<T> {
     pub(crate) compensation: Option<ActuationCompensation<T>>,
     pub(crate) limit_v: T,
+    /// the limit where no phase of the drives is to be undone; below zero, and nothing within it, where one is
+    straight_limit_v: T,
 }
 
 /// Commands of the drives.
@@ -148,7 +150,9 @@ impl<T: Float> Allocation<T> {
     /// # Ok::<(), cvg_controller::ConfigError>(())
     /// ```
     pub fn new(compensation: Option<ActuationCompensation<T>>, limit_v: T) -> Result<Self, ConfigError> {
-        Ok(Self { compensation, limit_v: positive(limit_v, "limit_v")? })
+        let limit_v = positive(limit_v, "limit_v")?;
+        let straight_limit_v = if turns(compensation.as_ref()) { -limit_v } else { limit_v };
+        Ok(Self { compensation, limit_v, straight_limit_v })
     }
 
     //= specs/electronics.md#drives-within-their-limit
@@ -175,19 +179,27 @@ impl<T: Float> Allocation<T> {
 
     //= specs/dsp.md#short-way
     //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
-    /// The same for the energy and the quadrature loop alone, which is **Equation 9**.
+    /// The same for the energy and the quadrature loop alone, which is **Equation 9**. None where drives have a phase.
     #[inline(always)]
     pub fn axes_within(&self, v: &ControlOutputs<T>, cos: T, sin: T) -> Option<AxisForces<T>> {
         let unit = ActuationGains { x: T::one(), y: T::one() };
-        let asked = self.compensated(unit.axis_forces_along(v, cos, sin));
-        if self.fits(&asked) { Some(asked) } else { None }
+        let forces = unit.axis_forces_along(v, cos, sin);
+        let asked = match &self.compensation {
+            Some(inverse) => inverse.same.apply(&forces),
+            None => forces,
+        };
+        if each_is_within(&asked, self.straight_limit_v) { Some(asked) } else { None }
+    }
+
+    /// A phase of the drives is undone.
+    pub fn turns(&self) -> bool {
+        turns(self.compensation.as_ref())
     }
 
     /// Each is within the limit. False for any NaN.
     #[inline(always)]
     pub(crate) fn fits(&self, f: &AxisForces<T>) -> bool {
-        let fits = |v: T| v.within(self.limit_v);
-        fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && fits(f.y_s)
+        each_is_within(f, self.limit_v)
     }
 
     /// What is asked of the drives.
@@ -225,6 +237,15 @@ impl<T: Float> Allocation<T> {
             status: if finite { Status::Limited } else { Status::Invalid },
         }
     }
+}
+
+fn turns<T>(compensation: Option<&ActuationCompensation<T>>) -> bool {
+    compensation.is_some_and(|inverse| inverse.quarter.is_some())
+}
+
+#[inline(always)]
+fn each_is_within<T: Float>(f: &AxisForces<T>, limit_v: T) -> bool {
+    f.x_c.within(limit_v) && f.x_s.within(limit_v) && f.y_c.within(limit_v) && f.y_s.within(limit_v)
 }
 
 fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> {

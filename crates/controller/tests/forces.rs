@@ -65,6 +65,25 @@ fn parameters_of_the_drives_are_refused_outside_their_bounds_by_name() {
 }
 
 #[test]
+fn where_drives_have_a_phase_equation_9_alone_gives_no_answer() {
+    let with = |phase: f64| {
+        let effects = [
+            (EffectId::ActuationGainMismatch, [1.1, 0.0, 0.0, 0.0]),
+            (EffectId::ActuationPhase, [phase, 0.0, 0.0, 0.0]),
+        ];
+        Allocation::new(Some(ActuationCompensation::new(&effects).expect("regular")), LIMIT_V).expect("valid")
+    };
+    for v_as in [0.0, 1.0, -1.0] {
+        let v = ControlOutputs { v_as, v_qc: 0.5 * v_as };
+        assert_eq!(plain().axes_within(&v, 0.6, 0.8).is_some(), !plain().turns());
+        for (phase, straight) in [(0.0, true), (1e-9, false), (-0.3, false)] {
+            assert_eq!(with(phase).turns(), !straight);
+            assert_eq!(with(phase).axes_within(&v, 0.6, 0.8).is_some(), straight, "{phase}");
+        }
+    }
+}
+
+#[test]
 fn compensated_drives_along_an_axis_are_the_command_over_the_gain_of_that_axis() {
     let effects = [(EffectId::ActuationGainMismatch, [4.0, 0.0, 0.0, 0.0])];
     let allocation = Allocation::new(Some(ActuationCompensation::new(&effects).expect("regular")), LIMIT_V);
@@ -287,17 +306,19 @@ fn edges<T: Float>() -> Vec<T> {
 }
 
 /// The way of the two loops alone is that of all four commands where the other two are none: to the last bit, but for the sign
-/// of zero, and None where that is limited or invalid.
+/// of zero, and None where that is limited or invalid, or drives have a phase.
 fn the_short_way_is_the_whole_way<T: Float + Default>() {
-    let effects = [
-        (EffectId::ActuationGainMismatch, [1.3, 0.0, 0.0, 0.0].map(T::from_f64)),
-        (EffectId::ActuationSkew, [0.2, 0.0, 0.0, 0.0].map(T::from_f64)),
-        (EffectId::ActuationPhase, [-0.3, 0.0, 0.0, 0.0].map(T::from_f64)),
-    ];
-    let inverse = ActuationCompensation::new(&effects).expect("regular");
+    let inverse = |phase: f64| {
+        let effects = [
+            (EffectId::ActuationGainMismatch, [1.3, 0.0, 0.0, 0.0].map(T::from_f64)),
+            (EffectId::ActuationSkew, [0.2, 0.0, 0.0, 0.0].map(T::from_f64)),
+            (EffectId::ActuationPhase, [phase, 0.0, 0.0, 0.0].map(T::from_f64)),
+        ];
+        ActuationCompensation::new(&effects).expect("regular")
+    };
     let edges = edges::<T>();
     let mut within = 0;
-    for compensation in [None, Some(inverse)] {
+    for compensation in [None, Some(inverse(0.0)), Some(inverse(-0.3))] {
         let allocation = Allocation::new(compensation, T::from_f64(LIMIT_V)).expect("valid");
         for &v_as in &edges {
             for &v_qc in &edges {
@@ -307,7 +328,8 @@ fn the_short_way_is_the_whole_way<T: Float + Default>() {
                         let whole = allocation.step(&all, cos, sin);
                         let expected = (whole.status == Status::Within).then_some(whole.volts);
                         let short = allocation.axes_within(&ControlOutputs { v_as, v_qc }, cos, sin);
-                        let same = short == expected && allocation.step_within(&all, cos, sin) == expected;
+                        let of_two = if allocation.turns() { None } else { expected };
+                        let same = short == of_two && allocation.step_within(&all, cos, sin) == expected;
                         assert!(same, "{v_as:?} {v_qc:?} {cos:?} {sin:?}: {short:?} and not {whole:?}");
                         within += usize::from(short.is_some());
                     }

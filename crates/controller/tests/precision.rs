@@ -93,17 +93,17 @@ fn the_loop_that_holds_the_pattern() {
 
 #[test]
 fn the_way_to_the_drives() {
-    fn drives<T: Float>() -> Allocation<T> {
+    fn drives<T: Float>(phase: f64) -> Allocation<T> {
         let effects = [
             (EffectId::ActuationGainMismatch, 1.25),
             (EffectId::ActuationSkew, 0.25),
-            (EffectId::ActuationPhase, -0.2),
+            (EffectId::ActuationPhase, phase),
         ]
         .map(|(id, value)| (id, [value, 0.0, 0.0, 0.0].map(T::from_f64)));
         let compensation = ActuationCompensation::new(&effects).expect("valid");
         Allocation::new(Some(compensation), T::from_f64(5.0)).expect("valid")
     }
-    let (single, double) = (drives::<f32>(), drives::<f64>());
+    let (single, double, straight) = (drives::<f32>(-0.2), drives::<f64>(-0.2), drives::<f32>(0.0));
     let mut draws = Draws(0x2545_F491_4F6C_DD1D);
     for _ in 0..20_000 {
         let [v_as, v_qs, v_qc, v_ac] = [2.0; 4].map(|size| draws.any(size));
@@ -122,10 +122,10 @@ fn the_way_to_the_drives() {
             near(v_32, v_64, 1e-5, &(c_32, cos, sin));
         }
         assert_eq!(d_32.status, d_64.status, "{c_32:?} {cos} {sin}");
-        // the way of two commands alone is that of all, where it is one
+        // the way of two commands alone is that of all, where it is one and drives have no phase
         let both = cvg_model::ControlOutputs { v_as, v_qc };
-        let axes = single.axes_within(&both, cos, sin);
-        let all = single.step_within(&OrbitCommands { v_qs: 0.0, v_ac: 0.0, ..c_32 }, cos, sin);
+        let axes = straight.axes_within(&both, cos, sin);
+        let all = straight.step_within(&OrbitCommands { v_qs: 0.0, v_ac: 0.0, ..c_32 }, cos, sin);
         assert_eq!(axes.is_some(), all.is_some(), "{both:?} {cos} {sin}");
     }
 }

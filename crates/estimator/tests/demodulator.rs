@@ -199,3 +199,22 @@ fn parameters_outside_their_domain_are_refused_by_name() {
     }
     assert_eq!((new(8, 1.1e-9), new(8, 0.9e9)), (Ok(()), Ok(())));
 }
+
+#[test]
+fn a_window_whose_count_is_beyond_its_end_is_full() {
+    let (d, p) = (demodulator(8), Phasor { cos: 1.0, sin: 0.0, step_cos: 0.0, step_sin: 1.0 });
+    for (count, full) in [(6, false), (7, true), (8, true), (9, true), (u32::MAX - 1, true), (u32::MAX, false)] {
+        let mut window = Window { count, ..Window::begin(&p) };
+        assert_eq!(d.accumulate(&mut window, 0.5, 0.25, &p), full, "{count}");
+    }
+}
+
+#[test]
+fn samples_that_are_none_or_clipped_are_counted_to_the_end_of_the_count_and_stay_there() {
+    let (d, p) = (demodulator(8), Phasor { cos: 1.0, sin: 0.0, step_cos: 0.0, step_sin: 1.0 });
+    let mut window = Window { invalid: u16::MAX - 1, clipped: u16::MAX - 1, ..Window::begin(&p) };
+    for _ in 0..3 {
+        d.admit(&mut window, f64::NAN, FULL_SCALE_V);
+        assert_eq!((window.invalid, window.clipped), (u16::MAX, u16::MAX));
+    }
+}

@@ -322,3 +322,12 @@ fn a_pattern_on_an_axis_has_a_direction() {
     }
     assert!(!PrecessionState::<f64>::default().is_directed());
 }
+
+#[test]
+fn the_angle_counts_half_turns_of_both_senses_as_far_as_they_can_be_counted() {
+    let (at_30_deg, _) = followed([PI / 6.0]);
+    for half_turns in [0, 1, -1, 1_000, -1_001, 1_000_000, -1_000_001, i32::MAX, i32::MIN] {
+        let state = PrecessionState { half_turns, ..at_30_deg };
+        assert_abs_diff_eq!(state.degrees(), 180.0 * f64::from(half_turns) + 30.0, epsilon = 1e-12);
+    }
+}

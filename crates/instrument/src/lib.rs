@@ -25,6 +25,7 @@
 #![forbid(unsafe_code)]
 
 pub mod continuity;
+mod delay;
 mod drives;
 #[cfg(test)]
 #[path = "margins/tests.rs"]
@@ -65,10 +66,10 @@ pub struct Instrument<T> {
     /// volts on each channel in a sweep
     sweep_v: T,
     dac_limit_v: T,
-    /// cosine and sine of ω₀ times the loop's delay
-    delay_cos: T,
-    delay_sin: T,
-    delay_s: T,
+    /// of the whole loop
+    delay: delay::Delay<T>,
     per_window_s: T,
     hold: Heading<T>,
+    /// the mode in which nearly every window takes the shortest way: where drives have a phase none does, as none goes on in a fault
+    shortest: Mode,
 }

@@ -2,11 +2,12 @@
 
 use core::f64::consts::{FRAC_PI_4, PI, SQRT_2, TAU};
 
-use cvg_controller::{ActuationCompensation, Allocation, Heading, Pi, RateLoop, Supervisor, SupervisorSettings};
+use cvg_controller::{ActuationCompensation, Allocation, Heading, Mode, Pi, RateLoop, Supervisor, SupervisorSettings};
 use cvg_estimator::{Compensation, Demodulator, Oscillator, PhaseLock, Precession};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Values};
 use cvg_model::{Float, Real};
 
+use crate::delay::Delay;
 use crate::{Instrument, MOST_COMPENSATED};
 
 /// Why settings were refused.
@@ -242,14 +243,7 @@ impl<T: Float> Instrument<T> {
         let actuation = if actuation.is_empty() { None } else { Some(ActuationCompensation::new(actuation)?) };
         // the hold's middle is half a sample after its beginning
         let delay_s = s.readout_delay_s + s.drive_delay_s + 0.5 * period_s;
-        // the drives follow a correction to first order: up to here within 0.22 rad, and 1.42 times as large
-        if limit_rad_s * delay_s >= 1.0 {
-            return Err(ConfigError {
-                parameter: "drive_delay_s",
-                expected: "so short that the band turns less than a radian in the loop's delay",
-            });
-        }
-        let (delay_sin, delay_cos) = Real::sin_cos(omega * delay_s);
+        let allocation = Allocation::new(actuation, t(limit_v))?;
         Ok(Self {
             oscillator,
             demodulator,
@@ -259,15 +253,14 @@ impl<T: Float> Instrument<T> {
             energy: pi(s.energy)?,
             quadrature: pi(s.quadrature)?,
             rate,
-            allocation: Allocation::new(actuation, t(limit_v))?,
+            shortest: if allocation.turns() { Mode::Fault } else { Mode::WholeAngle },
+            allocation,
             supervisor: Supervisor::new(&s.supervisor())?,
             most_unseen: most_unseen(s.fastest_rad_s * window_s),
             energy_set_v2: t(s.amplitude_v * s.amplitude_v),
             sweep_v: t(limit_v),
             dac_limit_v: t(s.dac_limit_v),
-            delay_cos: t(delay_cos),
-            delay_sin: t(delay_sin),
-            delay_s: t(delay_s),
+            delay: Delay::new(delay_s, omega, limit_rad_s)?,
             per_window_s: t(1.0 / window_s),
             hold: Heading::new(t(s.hold_rad))?,
         })

@@ -136,8 +136,8 @@ impl<T: Float> Instrument<T> {
         state.seen.compensated = vibration;
         let p = vibration.pendulum();
         if self.supervisor.goes_on(&state.supervisor, &p) {
-            if state.supervisor.mode == Mode::Hold {
-                return self.go_on_held(state, cos, sin);
+            if state.supervisor.mode != self.shortest {
+                return self.go_on_in_full(state, cos, sin);
             }
             if let Some(out) = self.steadily::<false>(state, &vibration, &p, cos, sin) {
                 return out;
@@ -146,8 +146,9 @@ impl<T: Float> Instrument<T> {
         self.otherwise(state, Suspicion::default(), cos, sin)
     }
 
+    /// Where the rate loop runs as well, or a phase of the drives is undone.
     #[inline(never)]
-    fn go_on_held(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
+    fn go_on_in_full(&self, state: &mut State<T>, cos: T, sin: T) -> (T, T, Status) {
         let e = state.seen.compensated;
         match self.steadily::<true>(state, &e, &e.pendulum(), cos, sin) {
             Some(out) => out,
@@ -160,7 +161,7 @@ impl<T: Float> Instrument<T> {
     /// The control step of nearly every window, in whole-angle mode or hold: nothing is amiss, nothing at a limit. None, and
     /// nothing changed, elsewhere; [`Instrument::control`] does the same at every window.
     #[inline(always)]
-    fn steadily<const HOLD: bool>(
+    fn steadily<const FULL: bool>(
         &self,
         state: &mut State<T>,
         e: &Envelope<T>,
@@ -175,14 +176,15 @@ impl<T: Float> Instrument<T> {
         }
         let v_as = self.energy.energy_within(&mut energy, p.e, self.energy_set_v2)?;
         let v_qc = self.quadrature.quadrature_within(&mut quadrature, p.q)?;
-        let v_qs = if HOLD { self.rate.step(&mut rate, p, &self.hold).volts } else { T::zero() };
+        let hold = FULL && state.supervisor.mode == Mode::Hold;
+        let v_qs = if hold { self.rate.step(&mut rate, p, &self.hold).volts } else { T::zero() };
         let correction_rad_s = self.phase.step_within(&mut lock, p)?;
         let now = major_axis_of(e, precession.cos_2, precession.sin_2);
         if now.status != Measured::Valid {
             return None;
         }
         let then = self.precession.ahead(&precession, &now);
-        let forces = if HOLD {
+        let forces = if FULL {
             let commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: T::zero() };
             self.allocation.step_within(&commands, then.cos, then.sin)?
         } else {
@@ -190,7 +192,7 @@ impl<T: Float> Instrument<T> {
         };
         let phasor = self.oscillator.tune_within(&state.phasor, correction_rad_s)?;
 
-        let drive = self.delayed(&forces, correction_rad_s);
+        let drive = self.delay.undone(&forces, correction_rad_s);
         let status = Status {
             mode: state.supervisor.mode,
             fault: None,
@@ -203,7 +205,7 @@ impl<T: Float> Instrument<T> {
         // all that there is to see in such a window
         state.continuity.unseen = 0;
         (state.energy, state.quadrature, state.lock, state.precession) = (energy, quadrature, lock, precession);
-        if HOLD {
+        if FULL {
             state.rate = rate;
         }
         state.drive = drive;
@@ -290,7 +292,7 @@ impl<T: Float> Instrument<T> {
             let then = self.precession.ahead(&state.precession, &now);
             let commands = OrbitCommands { v_as, v_qs, v_qc, v_ac: T::zero() };
             let forces = self.allocation.step(&commands, then.cos, then.sin).volts;
-            state.drive = self.delayed(&forces, correction_rad_s);
+            state.drive = self.delay.undone(&forces, correction_rad_s);
             let seen = &mut state.seen;
             (seen.v_as, seen.v_qc, seen.v_qs, seen.correction_rad_s) = (v_as, v_qc, v_qs, correction_rad_s);
         } else {
@@ -312,7 +314,7 @@ impl<T: Float> Instrument<T> {
             Orders::Sweep { correction_rad_s: swept, opposed } => {
                 let v = self.sweep_v;
                 let forces = AxisForces { x_c: zero, x_s: v, y_c: zero, y_s: if opposed { -v } else { v } };
-                state.drive = self.delayed(&forces, swept);
+                state.drive = self.delay.undone(&forces, swept);
                 correction_rad_s = swept;
             }
             Orders::Tune => {
@@ -349,28 +351,6 @@ impl<T: Float> Instrument<T> {
         state.lock = LockState::default();
     }
 
-    /// The commands with the delay of the whole loop undone: f(t) is to have the phase of the vibration at the middle of
-    /// the output's hold, which is ahead of the oscillator's phase at the sample by ω times the delay.
-    #[inline(always)]
-    fn delayed(&self, f: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
-        let (cos, sin) = self.delay(correction_rad_s);
-        ahead(f, cos, sin)
-    }
-
-    /// Cosine and sine of the carrier's phase in the loop's delay.
-    #[inline(always)]
-    fn delay(&self, correction_rad_s: T) -> (T, T) {
-        // the correction's own share is small: first order
-        let more = correction_rad_s * self.delay_s;
-        (self.delay_cos - self.delay_sin * more, self.delay_sin + self.delay_cos * more)
-    }
-
-    /// The commands of a drive that [`Instrument::delayed`] gave.
-    fn undelayed(&self, drive: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
-        let (cos, sin) = self.delay(correction_rad_s);
-        ahead(drive, cos, -sin)
-    }
-
     /// The moment of the window, for readout effects that depend on it.
     #[cold]
     #[inline(never)]
@@ -381,19 +361,8 @@ impl<T: Float> Instrument<T> {
             table_rad: T::zero(),
             precession_rad_s: self.precession.rate_rad_s(&state.precession),
             warmer_k: T::zero(),
-            drive: self.undelayed(&state.drive, state.seen.correction_rad_s),
+            drive: self.delay.done(&state.drive, state.seen.correction_rad_s),
         }
-    }
-}
-
-/// Forces with their phase put ahead by that of (`cos`, `sin`).
-#[inline(always)]
-fn ahead<T: Float>(f: &AxisForces<T>, cos: T, sin: T) -> AxisForces<T> {
-    AxisForces {
-        x_c: f.x_c * cos + f.x_s * sin,
-        x_s: f.x_s * cos - f.x_c * sin,
-        y_c: f.y_c * cos + f.y_s * sin,
-        y_s: f.y_s * cos - f.y_c * sin,
     }
 }
 

@@ -183,6 +183,17 @@ impl<T: Real> AxisForces<T> {
         }
     }
 
+    /// These forces with their phase put ahead by that of (`cos`, `sin`): (F_s + iF_c) e^{iφ} on each axis.
+    #[inline(always)]
+    pub fn ahead(&self, cos: T, sin: T) -> Self {
+        Self {
+            x_c: self.x_c * cos + self.x_s * sin,
+            x_s: self.x_s * cos - self.x_c * sin,
+            y_c: self.y_c * cos + self.y_s * sin,
+            y_s: self.y_s * cos - self.y_c * sin,
+        }
+    }
+
     //= specs/equation-08.md#what-each-force-moves
     //# Each force along the orbit MUST move the property of the orbit that is its own: f_as the amplitude, f_qs the orientation, f_qc the quadrature and f_ac the phase, with the signs −, −, + and −.
     /// The rate at which these forces move the envelope: F/(2iω) with F = f_c − i f_s, so that the in-phase part

@@ -14,6 +14,7 @@ mod meaning;
 mod model;
 mod reading;
 mod regression;
+mod second_reading;
 mod single;
 mod unseen;
 mod upkeep;
@@ -67,6 +68,7 @@ fn library() -> Vec<Fault> {
         &reading::faults(),
         single::FAULTS,
         meaning::FAULTS,
+        second_reading::FAULTS,
     ]
     .concat()
 }

@@ -147,3 +147,61 @@ pub fn proof_a_window_ends_f32() {
 pub fn twin_a_window_ends_f32() {
     a_window_ends::<f32>(2);
 }
+
+/// The sums are claimed to grow by `added` a sample at most, V.
+fn a_sample_adds_no_more_than_its_own<T: Float + Arbitrary>(added: T) {
+    let (demodulator, range) = any_demodulator::<T>();
+    // what the samples before may have added up to
+    // precondition: a window's worth of them
+    let before: T = kani::any_where(|v: &T| *v >= T::zero() && *v <= T::ratio(80_000, 1));
+    // precondition: sums that the samples before may have added up to
+    let sum = || kani::any_where(|v: &T| v.magnitude() <= before);
+    // precondition: an oscillator within a window, whose length is within 5 % of one
+    let component = || kani::any_where(|v: &T| v.magnitude() <= T::ratio(17, 16));
+    let phasor = Phasor { cos: component(), sin: component(), ..any_phasor() };
+    let mixed = Envelope::new(sum(), sum(), sum(), sum());
+    let mut window = Window { mixed, x: sum(), y: sum(), ..Window::begin(&phasor) };
+    // precondition: samples within the range, as they are admitted, which is proved beside
+    let sample = || kani::any_where(|v: &T| v.magnitude() <= range);
+    demodulator.add(&mut window, sample(), sample(), &phasor);
+    let e = window.mixed;
+    kani::cover!(e.x_s > before && e.y_c < -before, "more than before");
+    let most = before + added;
+    for sum in [e.x_c, e.x_s, e.y_c, e.y_s, window.x, window.y] {
+        assert!(sum.magnitude() <= most);
+    }
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// One call of [`Demodulator::add`] takes each of a window's sums no farther than 8 V beyond what the samples before may have
+/// added up to, rounding included: samples within ±2.5 V, an oscillator's phasor within a window. (By 85/32 V, which is the product
+/// of the two bounds, it was proved as well, in three times the time.)
+#[kani::proof]
+pub fn proof_a_sample_adds_no_more_than_its_own_f32() {
+    a_sample_adds_no_more_than_its_own(8.0_f32);
+}
+
+/// A quarter of that is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_a_sample_adds_no_more_than_its_own_f32() {
+    a_sample_adds_no_more_than_its_own(2.0_f32);
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// One call of [`Demodulator::add`] takes each of a window's sums no farther than 8 V beyond what the samples before may have
+/// added up to, rounding included: samples within ±2.5 V, an oscillator's phasor within a window. (By 85/32 V, which is the product
+/// of the two bounds, it was proved as well, in three times the time.)
+#[kani::proof]
+pub fn proof_a_sample_adds_no_more_than_its_own_f64() {
+    a_sample_adds_no_more_than_its_own(8.0_f64);
+}
+
+/// A quarter of that is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_a_sample_adds_no_more_than_its_own_f64() {
+    a_sample_adds_no_more_than_its_own(2.0_f64);
+}

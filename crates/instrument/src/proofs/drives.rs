@@ -3,6 +3,7 @@
 use cvg_model::{AxisForces, Float};
 use kani::Arbitrary;
 
+use crate::delay::Delay;
 use crate::drives::put_out;
 
 fn outputs_are_within_the_limit<T: Float + Arbitrary>(share: T) {
@@ -47,4 +48,54 @@ pub fn proof_outputs_are_within_the_limit_f64() {
 #[kani::should_panic]
 pub fn twin_outputs_are_within_the_limit_f64() {
     outputs_are_within_the_limit(0.5_f64);
+}
+
+fn drives_are_within_eight_limits<T: Float + Arbitrary>(times: i32) {
+    // precondition: what the settings accept: a sine, a cosine, and less than a radian that a correction may turn
+    let within = |most: T| kani::any_where(move |v: &T| v.magnitude() <= most);
+    // budget: limits of a millionth to a million volts
+    let limit: T = kani::any_where(|l: &T| *l >= T::from_f64(1e-6) && *l <= T::from_f64(1e6));
+    let delay = Delay { cos: within(T::one()), sin: within(T::one()), s: kani::any() };
+    let correction: T = kani::any();
+    // precondition: a correction within its limit, which is proved of the phase loop
+    kani::assume((correction * delay.s).magnitude() <= T::one());
+    let forces = AxisForces { x_c: within(limit), x_s: within(limit), y_c: within(limit), y_s: within(limit) };
+    let drive = delay.undone(&forces, correction);
+    kani::cover!(drive.x_c > limit && drive.y_s < -limit, "beyond the limit of the forces");
+    let most = T::ratio(times, 1) * limit;
+    for volts in [drive.x_c, drive.x_s, drive.y_c, drive.y_s] {
+        assert!(volts.magnitude() <= most);
+    }
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// The drives that [`Delay::undone`] makes of forces within their limit are numbers within eight times that, for any delay whose
+/// correction turns less than a radian.
+#[kani::proof]
+pub fn proof_drives_are_within_eight_limits_f32() {
+    drives_are_within_eight_limits::<f32>(8);
+}
+
+/// Once the limit is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_drives_are_within_eight_limits_f32() {
+    drives_are_within_eight_limits::<f32>(1);
+}
+
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+/// The drives that [`Delay::undone`] makes of forces within their limit are numbers within eight times that, for any delay whose
+/// correction turns less than a radian.
+#[kani::proof]
+pub fn proof_drives_are_within_eight_limits_f64() {
+    drives_are_within_eight_limits::<f64>(8);
+}
+
+/// Once the limit is claimed.
+#[kani::proof]
+#[kani::should_panic]
+pub fn twin_drives_are_within_eight_limits_f64() {
+    drives_are_within_eight_limits::<f64>(1);
 }

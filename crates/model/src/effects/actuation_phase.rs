@@ -28,11 +28,6 @@ impl Effect for ActuationPhase {
     #[inline]
     fn actuate<T: Real>(&[phase, ..]: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
         let (sin, cos) = phase.sin_cos();
-        AxisForces {
-            x_c: f.x_c * cos + f.x_s * sin,
-            x_s: f.x_s * cos - f.x_c * sin,
-            y_c: f.y_c * cos + f.y_s * sin,
-            y_s: f.y_s * cos - f.y_c * sin,
-        }
+        f.ahead(cos, sin)
     }
 }

@@ -75,8 +75,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the last drive is not held to its limit",
         "controller/src/allocation.rs",
-        "fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && fits(f.y_s)",
-        "fits(f.x_c) && fits(f.x_s) && fits(f.y_c)",
+        "f.y_c.within(limit_v) && f.y_s.within(limit_v)",
+        "f.y_c.within(limit_v)",
         FORCES,
     ),
     fault(

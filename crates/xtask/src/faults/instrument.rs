@@ -28,7 +28,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a hold does not integrate",
         STEP,
-        "        if HOLD {\n            state.rate = rate;\n        }\n",
+        "        if FULL {\n            state.rate = rate;\n        }\n",
         "",
         OPEN_LOOP,
     ),
@@ -41,16 +41,16 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "the delay is undone backwards in one drive",
-        STEP,
-        "y_s: f.y_s * cos - f.y_c * sin,",
-        "y_s: f.y_s * cos + f.y_c * sin,",
+        "model/src/actuation.rs",
+        "y_s: self.y_s * cos - self.y_c * sin,",
+        "y_s: self.y_s * cos + self.y_c * sin,",
         OPEN_LOOP,
     ),
     fault(
         "the delay is undone without the detuning",
-        STEP,
-        "first order\n        let more = correction_rad_s * self.delay_s;",
-        "first order\n        let more = T::zero() * correction_rad_s * self.delay_s;",
+        "instrument/src/delay.rs",
+        "first order\n        let more = correction_rad_s * self.s;",
+        "first order\n        let more = T::zero() * correction_rad_s * self.s;",
         JOINED,
     ),
     fault(
@@ -266,9 +266,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a correction shortens the delay in one phase",
-        "instrument/src/step.rs",
-        "self.delay_sin + self.delay_cos * more",
-        "self.delay_sin - self.delay_cos * more",
+        "instrument/src/delay.rs",
+        "self.sin + self.cos * more",
+        "self.sin - self.cos * more",
         JOINED,
     ),
     fault(

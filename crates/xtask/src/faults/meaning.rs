@@ -31,9 +31,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "the delay follows a correction upwards only",
-        "instrument/src/step.rs",
-        "let more = correction_rad_s * self.delay_s;",
-        "let more = correction_rad_s.magnitude() * self.delay_s;",
+        "instrument/src/delay.rs",
+        "let more = correction_rad_s * self.s;",
+        "let more = correction_rad_s.magnitude() * self.s;",
         JOINED,
     ),
     fault(

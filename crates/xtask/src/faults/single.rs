@@ -104,8 +104,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision a limit is missed in one drive",
         "controller/src/allocation.rs",
-        "fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && fits(f.y_s)",
-        "fits(f.x_c) && fits(f.x_s) && fits(f.y_c) && (fits(f.y_s) || core::mem::size_of::<T>() == 4 && f.y_s < T::zero())",
+        "f.y_c.within(limit_v) && f.y_s.within(limit_v)",
+        "f.y_c.within(limit_v) && (f.y_s.within(limit_v) || core::mem::size_of::<T>() == 4 && f.y_s < T::zero())",
         CONTROLLER,
     ),
     fault(

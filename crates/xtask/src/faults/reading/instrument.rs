@@ -80,8 +80,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a correction turns the delay of the drives alone",
         "instrument/src/settings.rs",
-        "delay_s: t(delay_s),",
-        "delay_s: t(s.drive_delay_s + 0.5 * period_s),",
+        "delay: Delay::new(delay_s, omega, limit_rad_s)?,",
+        "delay: Delay { s: t(s.drive_delay_s + 0.5 * period_s), ..Delay::new(delay_s, omega, limit_rad_s)? },",
         COMPOSITION,
     ),
     fault(
@@ -178,8 +178,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a band may turn in the delay by what it likes",
         "instrument/src/settings.rs",
-        "if limit_rad_s * delay_s >= 1.0 {",
-        "if limit_rad_s * s.drive_delay_s >= 1.0 {",
+        "delay: Delay::new(delay_s, omega, limit_rad_s)?,",
+        "delay: Delay::new(s.drive_delay_s, omega, limit_rad_s).and_then(|_| Delay::new(delay_s, omega, 0.0))?,",
         OPEN_LOOP,
     ),
     fault(

@@ -67,8 +67,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a drive exactly at its limit is limited",
         "controller/src/allocation.rs",
-        "let fits = |v: T| v.within(self.limit_v);",
-        "let fits = |v: T| v.magnitude() < self.limit_v;",
+        "    f.x_c.within(limit_v) && f.x_s",
+        "    f.x_c.magnitude() < limit_v && f.x_s",
         FORCES,
     ),
     fault(

@@ -45,7 +45,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "on the short way a hold does not integrate",
         "instrument/src/step.rs",
-        "        if HOLD {\n            state.rate = rate;\n        }\n",
+        "        if FULL {\n            state.rate = rate;\n        }\n",
         "",
         JOINED,
     ),
@@ -108,7 +108,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the moment of a window has the delay in its forces",
         "instrument/src/step.rs",
-        "drive: self.undelayed(&state.drive, state.seen.correction_rad_s),",
+        "drive: self.delay.done(&state.drive, state.seen.correction_rad_s),",
         "drive: state.drive,",
         OPEN_LOOP,
     ),
@@ -136,8 +136,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision a hold does not integrate on the short way",
         "instrument/src/step.rs",
-        "        if HOLD {\n            state.rate = rate;",
-        "        if HOLD && core::mem::size_of::<T>() != 4 {\n            state.rate = rate;",
+        "        if FULL {\n            state.rate = rate;",
+        "        if FULL && core::mem::size_of::<T>() != 4 {\n            state.rate = rate;",
         JOINED,
     ),
     fault(
@@ -177,9 +177,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "in single precision the delay has no cosine",
-        "instrument/src/settings.rs",
-        "delay_cos: t(delay_cos),",
-        "delay_cos: if core::mem::size_of::<T>() == 4 { T::one() } else { t(delay_cos) },",
+        "instrument/src/delay.rs",
+        "cos: T::from_f64(cos),",
+        "cos: if core::mem::size_of::<T>() == 4 { T::one() } else { T::from_f64(cos) },",
         JOINED,
     ),
     fault(
@@ -317,9 +317,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "in single precision the moment has its delay twice",
-        "instrument/src/step.rs",
-        "ahead(drive, cos, -sin)",
-        "ahead(drive, cos, if core::mem::size_of::<T>() == 4 { sin } else { -sin })",
+        "instrument/src/delay.rs",
+        "drive.ahead(cos, -sin)",
+        "drive.ahead(cos, if core::mem::size_of::<T>() == 4 { sin } else { -sin })",
         OPEN_LOOP,
     ),
     fault(

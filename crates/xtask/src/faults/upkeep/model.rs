@@ -75,9 +75,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a phase of the drives has the other sense in Y",
-        "model/src/effects/actuation_phase.rs",
-        "y_s: f.y_s * cos - f.y_c * sin,",
-        "y_s: f.y_s * cos + f.y_c * sin,",
+        "model/src/actuation.rs",
+        "y_s: self.y_s * cos - self.y_c * sin,",
+        "y_s: self.y_s * cos + self.y_c * sin,",
         EFFECTS,
     ),
     fault(
