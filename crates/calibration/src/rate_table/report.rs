@@ -1,6 +1,7 @@
 //! What was found on a rate table, as facts.
 
 use cvg_model::effects::EffectId;
+use cvg_model::effects::harmonic_n::scaling::DIRECTION;
 use nalgebra::DMatrix;
 
 use crate::diagnostics::influences::shares;
@@ -11,6 +12,7 @@ use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::identified::Identification;
+use crate::model::hypothesis::{Member, Origin};
 use crate::numerics::statistics::span;
 use crate::rate_table::errors::{Errors, figures};
 use crate::recording::Role;
@@ -90,6 +92,7 @@ impl Found {
         };
         let mut runs = self.runs(head.runs, &mut warnings);
         warnings.extend(self.extrapolated());
+        warnings.extend(fitted.fit.hypothesis.members.iter().filter_map(large_without_cause));
         let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some().then_some(&own_ratios));
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
@@ -261,6 +264,23 @@ fn left_over(heldout: &Heldout) -> Option<String> {
             "what is left on held-out data is {floors:.1} times the noise floor: an effect that nothing here explains, a \
              recording that changed on its way, or noise that wanders; what is left may be in every value as well, and the \
              intervals of angular and detection gain allow for it"
+        )
+    })
+}
+
+/// A correction without a known cause, rad, from which on a report warns of it: electronics that work are off by a degree at most.
+const LARGE_WITHOUT_CAUSE: f64 = 0.0175;
+
+/// Says that a harmonic is corrected that is too large to be an error of electronics that work.
+fn large_without_cause(member: &Member) -> Option<String> {
+    let [n, cos, sin, scaling] = member.values;
+    let is_one = member.id == EffectId::HarmonicN && member.origin == Origin::Empirical && scaling <= DIRECTION;
+    let amplitude = cos.hypot(sin);
+    (is_one && amplitude > LARGE_WITHOUT_CAUSE).then(|| {
+        format!(
+            "an error of {:.2}° at {n:.0}θ is corrected without a known cause: electronics that work are off by a degree at most; \
+             what makes it may be in every value",
+            amplitude.to_degrees()
         )
     })
 }
