@@ -41,7 +41,22 @@ pub fn run(bytes: &[u8]) {
     let Some(recording) = admitted(read) else { return };
     as_promised(&recording);
     recording.write_csv(std::io::sink()).expect("what was read can be written");
-    recording.write_parquet(std::io::sink()).expect("what was read can be written");
+    let mut parquet = vec![];
+    recording.write_parquet(&mut parquet).expect("what was read can be written");
+    reads_back(&recording, &parquet);
+}
+
+/// What was written as Parquet is read as what it was: the same columns, in the same units.
+fn reads_back(recording: &Recording, parquet: &[u8]) {
+    let path = FOLDER.path().join(format!("{:?}-again.parquet", std::thread::current().id()));
+    fs::write(&path, parquet).expect("a temporary file");
+    let again = Recording::read(&path).expect("what was written is read");
+    let written = |recording: &Recording| {
+        let mut text = vec![];
+        recording.write_csv(&mut text).expect("what was read can be written");
+        text
+    };
+    assert_eq!(written(&again), written(recording));
 }
 
 /// Takes the file as one of many devices.

@@ -6,6 +6,7 @@ mod campaign;
 mod container;
 mod csv;
 mod effect;
+mod identify;
 mod scenario;
 mod step;
 
@@ -19,6 +20,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("container", container::run),
     ("csv", csv::run),
     ("effect", effect::run),
+    ("identify", identify::run),
     ("scenario", scenario::run),
     ("step", step::run),
 ];

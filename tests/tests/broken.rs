@@ -6,6 +6,8 @@ use cvg_calibration::report::Status;
 use cvg_calibration::{Cause, Identification, Options, Refusal, identify};
 use cvg_tests::bench::Draws;
 
+#[path = "broken/amplitude.rs"]
+mod amplitude;
 #[path = "broken/damages.rs"]
 mod damages;
 #[path = "broken/lies.rs"]

@@ -25,6 +25,7 @@ mod parquet;
 mod raw;
 mod requirement;
 mod stamp;
+mod stated;
 mod table;
 mod text;
 mod units;

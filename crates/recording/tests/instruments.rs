@@ -229,12 +229,16 @@ fn a_rate_mapped_to_an_angle_is_integrated_over_the_rows_that_are_kept() {
     assert_eq!(negated.theta_deg.unwrap()[1], -0.25, "a factor is the user's own, in deg/s a unit");
 }
 
-/// Without a row of units 450 °C would be read as 450 K, and a time of years as milliseconds since 1970.
+/// Without its unit 450 °C would be read as 450 K, a time of years as milliseconds since 1970, and counts as volts.
 #[test]
 fn what_was_stated_in_a_unit_and_looks_like_another_is_written_with_its_unit() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = folder.path().join("hot.parquet");
     for text in [
         "t_s,table_deg,xc_v,yc_v,note,temp_c\ns,deg,V,V,-,K\n0,0,1,0,a,723.1\n1,1,1,0,b,724\n",
         "t_s,theta_deg,table_deg\nh,deg,deg\n1e9,0,0\n2e9,1,1\n",
+        "t_s,xc_v,yc_v,temp_c\ns,counts,counts,K\n0,100,0,723.1\n1,0,100,724\n",
+        "t_s,xc_v,yc_v\ns,\"a, b\",\"a, b\"\n0,100,0\n1,0,100\n",
     ] {
         let read = |text: &[u8]| Recording::parse_csv(text, Path::new("hot.csv")).unwrap();
         let written = |recording: &Recording| {
@@ -243,8 +247,11 @@ fn what_was_stated_in_a_unit_and_looks_like_another_is_written_with_its_unit() {
             text
         };
         let first = read(text.as_bytes());
-        let again = read(&written(&first));
-        assert_eq!((again.temp_c.as_ref(), &again.t_s), (first.temp_c.as_ref(), &first.t_s));
-        assert_eq!(written(&again), written(&first));
+        first.write_parquet(std::fs::File::create(&path).unwrap()).unwrap();
+        for again in [read(&written(&first)), Recording::read(&path).unwrap()] {
+            assert_eq!((again.temp_c.as_ref(), &again.t_s), (first.temp_c.as_ref(), &first.t_s));
+            assert_eq!((again.xc_v.as_ref(), &again.readout_unit), (first.xc_v.as_ref(), &first.readout_unit));
+            assert_eq!(written(&again), written(&first));
+        }
     }
 }

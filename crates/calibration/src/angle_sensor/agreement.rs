@@ -22,6 +22,9 @@ const SAME_LEFT: f64 = 5.0;
 /// A sensor that was mounted anew, or drifted, draws another ellipse. It is still believed to be one where the ellipse of
 /// either run takes out at least half of what the other is off a circle by: engineering choice.
 const LEFT_WHEN_MOUNTED_ANEW: f64 = 0.5;
+/// A run on a circle stays on it to this share of what the ellipse of another bends it by: it was divided by its own amplitude.
+/// The other's ellipse stands for something where it takes out half of what that run is off a circle by, as above.
+const ON_A_CIRCLE: f64 = 0.1;
 /// Amplitudes of one sensor in one unit are within this factor: a thousand is the next unit.
 const SAME_AMPLITUDE: f64 = 30.0;
 /// A channel stands still where it moves by less than this share of the other.
@@ -67,11 +70,20 @@ impl Own {
         if self.times(other).ln().abs() > SAME_AMPLITUDE.ln() {
             return Together::No;
         }
+        if self.is_on_a_circle_beside(other) || other.is_on_a_circle_beside(self) {
+            return Together::No;
+        }
         if self.across(other) <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left)) {
             return Together::Alike;
         }
         let rounder = |a: &Self, b: &Self| off(&a.readout, &b.run) <= LEFT_WHEN_MOUNTED_ANEW * b.as_recorded;
         if rounder(self, other) && rounder(other, self) { Together::MountedAnew } else { Together::No }
+    }
+
+    /// It draws a circle where the other needs its ellipse.
+    fn is_on_a_circle_beside(&self, other: &Self) -> bool {
+        let stands = other.left <= LEFT_WHEN_MOUNTED_ANEW * other.as_recorded;
+        stands && self.as_recorded < ON_A_CIRCLE * off(&other.readout, &self.run)
     }
 
     fn times(&self, other: &Self) -> f64 {
@@ -106,6 +118,15 @@ impl Own {
                 "its amplitude is {:.4e}, that of {} is {:.4e}: one of them is in another unit",
                 self.amplitude, other.run.name, other.amplitude
             );
+        }
+        for (circle, ellipse) in [(self, other), (other, self)] {
+            if circle.is_on_a_circle_beside(ellipse) {
+                return format!(
+                    "the channels of {} lie on a circle to {:.1e} of its radius as recorded, those of {} draw an ellipse: those on the \
+                     circle were divided by their own amplitude, or are of another sensor",
+                    circle.run.name, circle.as_recorded, ellipse.run.name
+                );
+            }
         }
         format!(
             "its channels do not draw what those of {} do: with the ellipse of the other undone the radius is off by {:.2} %, \

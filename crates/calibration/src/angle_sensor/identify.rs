@@ -1,6 +1,7 @@
 //! The main job for angle sensors and rate gyroscopes: runs made ready, a model selected and fitted, the held-out rows read
 //! once at the end, and a report of it all.
 
+use super::circle;
 use super::deviations::{Deviations, deviations, own_gain_ratios};
 use super::effects::Described;
 use super::jumps::without_jumps;
@@ -8,6 +9,7 @@ use super::model::{Outcome, SensorModel};
 use super::rate_gyroscope::{RateGyroscope, T_PARTS};
 use super::rate_regression::Term;
 use super::rate_runs;
+use super::readout::Kind;
 use super::report::{ByItself, Errors, Finding, Head, report};
 use super::samples::{SensorRun, apart, prepare};
 use super::screening::believed;
@@ -143,7 +145,7 @@ fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
 fn raw_turns(model: &SensorModel) -> bool {
     model.front().is_none_or(|r| {
         let [x, y] = r.undo([0.0, 0.0]);
-        r.kind == super::readout::Kind::Plain || x.hypot(y) < r.radius
+        r.kind == Kind::Plain || x.hypot(y) < r.radius
     })
 }
 
@@ -232,9 +234,12 @@ fn sensor_finding(
     if against {
         warnings.push(counts_against(gain_ratio));
     }
-    if gain_ratio.is_none() && !neutral {
+    let on_a_circle =
+        model.front().filter(|r| r.kind == Kind::Plain).and_then(|_| circle::said_of(&model.sensor, runs));
+    if gain_ratio.is_none() && !neutral && on_a_circle.is_none() {
         warnings.push("detection_gain_ratio is null: no gain and skew were needed to predict the angle".into());
     }
+    warnings.extend(on_a_circle);
     let samples = model.sensor.samples(&thinned, declared.as_ref());
     Ok(Finding {
         instrument: Instrument::Sensor,

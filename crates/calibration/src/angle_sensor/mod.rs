@@ -2,6 +2,7 @@
 //! encoders, magnetometers, interferometers.
 mod agreement;
 mod autoregression;
+mod circle;
 mod cross_validation;
 pub(crate) mod curve;
 mod deviations;

@@ -2,6 +2,7 @@
 
 use cvg_model::effects::EffectId;
 
+use super::circle;
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
@@ -111,8 +112,10 @@ impl SensorModel {
         {
             // what the memory of the noise explains as well is no table; a readout shows in the radius, too
             let raw = Readout { rails: found.rails, ..Readout::plain() };
+            let ln_radius =
+                |readout: &Readout| -> Vec<_> { runs.iter().map(|r| circle::ln_radius(r, readout)).collect() };
             gain = autoregression::gain(&raw_errors, &errors, found.free().len())
-                + autoregression::gain(&ln_radius(runs, &raw), &ln_radius(runs, found), 0);
+                + autoregression::gain(&ln_radius(&raw), &ln_radius(found), 0);
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
             predicted = alone.rms();
         }
@@ -158,6 +161,9 @@ impl SensorModel {
         }
         let fitted = fit(chosen.model, Weighting::Radius, runs, sensor.gain, &start);
         let readout = fitted.ok_or_else(|| refuse("no ellipse fits the channels".into()))?.readout;
+        if let Some(what) = circle::said_of(&sensor, runs) {
+            return Err(Refusal::no_answer("campaign", what, "the channels as they were converted"));
+        }
         let samples = sensor.samples(runs, Some(&readout));
         let shape = Shape::constant(false);
         let table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)
@@ -183,17 +189,6 @@ impl SensorModel {
         let samples = self.sensor.samples(std::slice::from_ref(run), self.front());
         samples.iter().map(|s| self.table.left(s)).collect()
     }
-}
-
-/// ln of the radius behind the readings of each run, off the rails, about its mean.
-fn ln_radius(runs: &[SensorRun], readout: &Readout) -> Vec<Vec<f64>> {
-    let of_run = |run: &SensorRun| {
-        let kept = run.channels().into_iter().flatten().filter(|z| !readout.rails.clips(**z));
-        let mut out: Vec<f64> = kept.map(|z| readout.ln_radius(*z)).collect();
-        centre(&mut out);
-        out
-    };
-    runs.iter().map(of_run).collect()
 }
 
 /// A value of the samples of each run.

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use cvg_model::effects::EffectId;
 use rayon::prelude::*;
 
+use super::circle;
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, cross_validate, losses_of_radius};
 use super::ellipse;
 use super::lines::strongest_and_its_aliases;
@@ -257,6 +258,9 @@ impl<'a> Selection<'a> {
             Kind::Plain => Readout { rails: self.rails, ..Readout::plain() },
             _ => self.fit_readout(front, &self.runs)?.readout,
         };
+        if !circle::shows(&whole, &self.runs) {
+            return None;
+        }
         let readouts: Vec<Readout> = (0..self.folds.count)
             .map(|fold| {
                 let kept = self.folds.without(&self.runs, fold);

@@ -4,6 +4,7 @@
 //! Such a jump is no error of the instrument. A segment that ends there and another that begins there have a bias each, and
 //! nothing of it is left.
 
+use crate::numerics::angles::wrapped;
 use crate::numerics::statistics::{median, robust_deviation};
 
 /// A jump is this many deviations of the usual steps.
@@ -16,6 +17,9 @@ const BESIDE: usize = 12;
 /// What is left of the jump between the medians of these.
 const STAYS: f64 = 0.5;
 
+/// A step of the angle against the input that is longer than this share of the period may be one of a period less, the other way.
+const EITHER_WAY: f64 = 0.25;
+
 /// A jump of the angle against the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slip {
@@ -25,6 +29,18 @@ pub(crate) struct Slip {
     pub(crate) by: f64,
 }
 
+/// Steps of the bearing, rad, against those that are expected, each the shorter way round the period.
+fn steps_off(bearing: &[f64], expected: &[f64], period: f64) -> Vec<f64> {
+    let steps = bearing.windows(2).zip(expected.windows(2));
+    steps.map(|(b, e)| wrapped((b[1] - b[0]) - (e[1] - e[0]), period)).collect()
+}
+
+/// Share of the steps that may be one of a period less, the other way: where they are many, the angle cannot be followed.
+pub(crate) fn either_way(bearing: &[f64], expected: &[f64], period: f64) -> f64 {
+    let off = steps_off(bearing, expected, period);
+    off.iter().filter(|d| d.abs() > EITHER_WAY * period).count() as f64 / off.len().max(1) as f64
+}
+
 /// The slips in a series of bearings, rad, of this period, that should go as `expected`, rad.
 pub(crate) fn slips(bearing: &[f64], expected: &[f64], period: f64) -> Vec<Slip> {
     let n = bearing.len().min(expected.len());
@@ -32,12 +48,7 @@ pub(crate) fn slips(bearing: &[f64], expected: &[f64], period: f64) -> Vec<Slip>
         return Vec::new();
     }
     let step = |v: &[f64], i: usize| v[i] - v[i - 1];
-    let off: Vec<f64> = (1..n)
-        .map(|i| {
-            let d = step(bearing, i) - step(expected, i);
-            d - period * (d / period).round()
-        })
-        .collect();
+    let off = steps_off(&bearing[..n], &expected[..n], period);
     let usual = median(&mut (1..n).map(|i| step(expected, i).abs()).collect::<Vec<_>>());
     let limit = (JUMP * robust_deviation(off.iter().copied())).max(LEAST_STEP * usual).max(LEAST_SHARE * period);
     let mut along = vec![0.0; n];
@@ -92,5 +103,15 @@ mod tests {
     fn a_spike_and_a_readout_error_are_no_slips() {
         let (bearing, expected) = followed(Some(500), None);
         assert_eq!(slips(&bearing, &expected, PI), []);
+    }
+
+    #[test]
+    fn steps_that_may_go_either_way_are_counted() {
+        let (bearing, expected) = followed(None, None);
+        assert_eq!(either_way(&bearing, &expected, PI), 0.0);
+        // every tenth is turned by 60°, so that a step out and one back may be 120° the other way
+        let turned = |(i, b): (usize, &f64)| if i % 10 == 5 { (b + PI / 3.0).rem_euclid(PI) } else { *b };
+        let turned: Vec<f64> = bearing.iter().enumerate().map(turned).collect();
+        assert!((either_way(&turned, &expected, PI) - 0.2).abs() < 1e-3);
     }
 }

@@ -5,7 +5,7 @@
 use crate::data::agreement::{Gain, RunGain, Verdict, verdict};
 use crate::data::plausibility::mend;
 use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, other_turns, sampling, spread_over};
-use crate::data::slips::slips;
+use crate::data::slips::{either_way, slips};
 use crate::data::track::{Track, run_name};
 use crate::error::Refusal;
 use crate::estimation::initial_guess::{Guess, Motion, bearing, bearings, motion};
@@ -21,6 +21,8 @@ const STATABLE: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 const MOST_BROKEN: f64 = 0.5;
 /// Runs to fit that have to be left where nothing can be made of one: of two, which is as it was meant is not known.
 const FEWEST_LEFT: usize = 2;
+/// A run cannot be followed if more than this share of its steps may go either way: engineering choice, spikes are fewer.
+const MOST_EITHER_WAY: f64 = 0.05;
 /// A run with more slips than this has no clock,
 const MOST_SLIPS: usize = 8;
 /// and neither has one with several that together go this share of its way: they are no slips of a clock beside which a
@@ -120,7 +122,7 @@ impl Screen {
     }
 
     /// Leaves out run `number` of all.
-    fn leave_out(&mut self, number: usize, run: &str, why: &str, warnings: &mut Vec<String>) {
+    pub(crate) fn leave_out(&mut self, number: usize, run: &str, why: &str, warnings: &mut Vec<String>) {
         warnings.push(format!("{run}: left out: {why}"));
         self.kept.retain(|n| *n != number);
         self.left_out.push(number);
@@ -372,6 +374,14 @@ fn cut_at_slips(
     let mut found = Vec::new();
     for (segment, bearing) in track.segments.iter().zip(bearings(track, hypothesis, 1)) {
         let expected: Vec<f64> = segment.range.clone().map(|i| along * track.input_rad[i]).collect();
+        let open = either_way(&bearing, &expected, hypothesis.period_rad);
+        if open > MOST_EITHER_WAY {
+            return Err(format!(
+                "its angle cannot be followed: {:.1} % of its steps from row to row are off by more than a quarter of the \
+                 period, and may be a period less the other way",
+                100.0 * open
+            ));
+        }
         let here = slips(&bearing, &expected, hypothesis.period_rad);
         found.extend(here.into_iter().map(|s| (segment.range.start + s.at, s.by)));
     }

@@ -27,6 +27,11 @@ pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
     SIGMA_PER_MAD * median(&mut magnitudes)
 }
 
+/// Root of the mean square.
+pub(crate) fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
 /// Standard deviation of the white part of a smooth series, from third differences: what varies over many samples
 /// does not count, spikes do not either.
 pub(crate) fn white_noise(series: &[f64]) -> f64 {

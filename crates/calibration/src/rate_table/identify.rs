@@ -45,6 +45,10 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         (options.progress)("beginning anew without the ring-downs of another device");
         (declared_fit, fitted, steps) = explained(&mut dataset, &paper)?;
     }
+    if dataset.without_divided_runs(&fitted.fit.hypothesis)? {
+        (options.progress)("beginning anew without the runs whose amplitude is not theirs");
+        (declared_fit, fitted, steps) = explained(&mut dataset, &paper)?;
+    }
     if let Some(found) = options.discover.then(|| clipping(&dataset, &fitted.fit.hypothesis)).flatten() {
         (options.progress)("beginning anew with drives that clip");
         dataset.clipping = Some((found.inverse_level.value, found.inverse_level.half_width() / 1.96));

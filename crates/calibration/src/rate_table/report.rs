@@ -1,6 +1,7 @@
 //! What was found on a rate table, as facts.
 
 use cvg_model::effects::EffectId;
+use cvg_model::effects::harmonic_n::scaling::DIRECTION;
 use nalgebra::DMatrix;
 
 use crate::diagnostics::influences::shares;
@@ -11,6 +12,8 @@ use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::identified::Identification;
+use crate::model::hypothesis::{Member, Origin};
+use crate::numerics::statistics::span;
 use crate::rate_table::errors::{Errors, figures};
 use crate::recording::Role;
 use crate::report::benefit::no_better;
@@ -89,6 +92,7 @@ impl Found {
         };
         let mut runs = self.runs(head.runs, &mut warnings);
         warnings.extend(self.extrapolated());
+        warnings.extend(fitted.fit.hypothesis.members.iter().filter_map(large_without_cause));
         let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some().then_some(&own_ratios));
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
@@ -117,7 +121,10 @@ impl Found {
             decay: None,
             warnings,
         };
-        report.warnings.extend(left_over(&report.heldout));
+        if let Some(what) = left_over(&report.heldout) {
+            report.warnings.push(what);
+            self.allow_for_what_is_left(&mut report);
+        }
         let mut calibration = self.calibration(&report, head.amplitude_v);
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
@@ -128,6 +135,18 @@ impl Found {
         let Self { dataset, fitted, steps, errors, .. } = self;
         let figures = figures(&dataset, Some(&errors.raw), &errors.declared, &errors.discovered, fitted.ring_downs);
         Ok(Identification { report, figures, calibration, steps, plots })
+    }
+
+    /// Widens the intervals of the angular gain and of the detection gain ratio by what can be in them of what is left: an error
+    /// Δk·α leaves Δk/√12 of the way rms, and one of the ratio, ½Δg sin 2θ, leaves Δg/√8.
+    fn allow_for_what_is_left(&self, report: &mut Report) {
+        let left = report.heldout.discovered.rms_deg.to_radians();
+        let ways = self.dataset.tracks.iter().map(|t| span(&t.track.input_rad));
+        let farthest = ways.fold(0.0, f64::max);
+        if farthest > 0.0 {
+            report.angular_gain = report.angular_gain.widened(12f64.sqrt() * left / farthest);
+        }
+        report.detection_gain_ratio = report.detection_gain_ratio.map(|ratio| ratio.widened(8f64.sqrt() * left));
     }
 
     fn calibration(&self, report: &Report, amplitude_v: Option<[f64; 2]>) -> Calibration {
@@ -243,7 +262,25 @@ fn left_over(heldout: &Heldout) -> Option<String> {
     (floors.is_finite() && floors > LEFT_OVER).then(|| {
         format!(
             "what is left on held-out data is {floors:.1} times the noise floor: an effect that nothing here explains, a \
-             recording that changed on its way, or noise that wanders; what is left may be in every value as well"
+             recording that changed on its way, or noise that wanders; what is left may be in every value as well, and the \
+             intervals of angular and detection gain allow for it"
+        )
+    })
+}
+
+/// A correction without a known cause, rad, from which on a report warns of it: electronics that work are off by a degree at most.
+const LARGE_WITHOUT_CAUSE: f64 = 0.0175;
+
+/// Says that a harmonic is corrected that is too large to be an error of electronics that work.
+fn large_without_cause(member: &Member) -> Option<String> {
+    let [n, cos, sin, scaling] = member.values;
+    let is_one = member.id == EffectId::HarmonicN && member.origin == Origin::Empirical && scaling <= DIRECTION;
+    let amplitude = cos.hypot(sin);
+    (is_one && amplitude > LARGE_WITHOUT_CAUSE).then(|| {
+        format!(
+            "an error of {:.2}° at {n:.0}θ is corrected without a known cause: electronics that work are off by a degree at most; \
+             what makes it may be in every value",
+            amplitude.to_degrees()
         )
     })
 }

@@ -1,6 +1,7 @@
 //! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
 //! the campaign tells it.
 
+use cvg_model::effects::harmonic_n::scaling::DIRECTION;
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
@@ -153,7 +154,8 @@ impl Inference<'_> {
         self.index(unknown).map(|_| unknown)
     }
 
-    /// G_Dy/G_Dx, where the campaign identifies it, with what each track alone tells of it.
+    /// G_Dy/G_Dx, where the campaign identifies it, with what each track alone tells of it. Its interval allows for what may be
+    /// taken for something else.
     pub(crate) fn detection_ratio(&self, own: &[Option<[f64; 2]>], warnings: &mut Vec<String>) -> Option<Estimate> {
         let estimate = self.first(EffectId::DetectionGainMismatch).map(|u| self.estimate(u));
         let identified = estimate.filter(|e| e.half_width() < WIDEST_DETECTION_RATIO);
@@ -161,8 +163,16 @@ impl Inference<'_> {
             warnings.push("the campaign cannot tell the detection gain ratio".into());
         }
         let runs = self.dataset.tracks.iter().map(|t| t.track.file.as_str()).zip(own.iter().copied());
+        let identified = identified.map(|ratio| ratio.widened(self.held_by_harmonics()));
         let ratio = covering(identified?, "detection gain ratio", runs, CONTRADICTS, warnings);
         Some(self.borne_out(ratio, warnings))
+    }
+
+    /// What harmonics without a cause may hold of the detection gain ratio, which is ½(g − 1) sin 2θ at every rate.
+    fn held_by_harmonics(&self) -> f64 {
+        let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
+        let alike = |m: &&Member| m.id == EffectId::HarmonicN && m.values[0] == 2.0 && m.values[3] <= DIRECTION;
+        causeless.filter(alike).map(|m| 2.0 * m.values[2].abs()).sum()
     }
 
     /// The detection gain ratio with an interval that also covers what the runs would tell of it without anisodamping, where

@@ -1,13 +1,13 @@
 //! CSV out: comma, LF, a header, numbers in the shortest form that reads back as the same number, NaN as an empty cell.
 //!
 //! Writes the columns in the order of the file they came from, unknown ones included. It has no other dialect. A row of units
-//! follows the header only where a column would be taken for one in another unit: temperatures above 230 °C for K.
+//! follows the header only where a column would otherwise be taken for one in another unit (`stated.rs`).
 
 use std::io::{self, Write};
 
 use rayon::prelude::*;
 
-use crate::{Channel, Outlet, Recording, units};
+use crate::{Outlet, Recording};
 
 /// Rows that one thread formats at a time.
 const ROWS: usize = 16 << 10;
@@ -29,9 +29,13 @@ impl Recording {
             push_text(&mut head, name, at == 0);
         }
         head.push(b'\n');
-        if outlets.iter().any(|(name, outlet)| is_taken_for_another_unit(name, outlet)) {
-            let units: Vec<&str> = outlets.iter().map(|(name, _)| unit(name)).collect();
-            head.extend_from_slice(units.join(",").as_bytes());
+        if let Some(units) = self.stated_units(&outlets) {
+            for (at, unit) in units.into_iter().enumerate() {
+                if at > 0 {
+                    head.push(b',');
+                }
+                push_text(&mut head, unit, at == 0);
+            }
             head.push(b'\n');
         }
         writer.write_all(&head)?;
@@ -53,30 +57,6 @@ impl Recording {
             }
         }
         writer.flush()
-    }
-}
-
-/// A column that states no unit and would be read in another: such a file has a row of units.
-fn is_taken_for_another_unit(name: &str, outlet: &Outlet<'_>) -> bool {
-    let Outlet::Numbers(values) = outlet else { return false };
-    match channel(name) {
-        Some(Channel::Time) => {
-            values.iter().copied().find(|t| t.is_finite()).is_some_and(|t| units::since_1970(t).is_some())
-        }
-        Some(Channel::Temperature) => units::absolute(values).is_some(),
-        _ => false,
-    }
-}
-
-fn channel(name: &str) -> Option<Channel> {
-    Channel::ALL.into_iter().find(|c| c.name() == name)
-}
-
-/// What stands below a name in a row of units.
-fn unit(name: &str) -> &'static str {
-    match channel(name) {
-        None | Some(Channel::X | Channel::Y) => "-",
-        Some(channel) => units::of_channel(channel),
     }
 }
 

@@ -11,6 +11,7 @@ use parquet::basic::{Compression, LogicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescPtr;
 
@@ -22,6 +23,7 @@ use crate::layout::{Field, Layout};
 use crate::memory;
 use crate::naming::Naming;
 use crate::parquet::sizes;
+use crate::stated;
 use crate::table::{Missing, Places, Table};
 use crate::unknown::Cells;
 
@@ -41,7 +43,7 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     sizes::check_footer(&mut pages, source)?;
     let reader = SerializedFileReader::new(file).map_err(|error| refuse(error.to_string()))?;
     let descriptions = reader.metadata().file_metadata().schema_descr_ptr();
-    let mut warnings = vec![];
+    let (mut warnings, mut has_stamps) = (vec![], false);
     let mut kept: Vec<usize> = vec![];
     let mut names: Vec<&str> = vec![];
     for (at, description) in descriptions.columns().iter().enumerate() {
@@ -54,6 +56,7 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
             )));
         }
         if is_stamp {
+            has_stamps = true;
             warnings.push("times are time stamps: `t_s` is counted from the first, in s".to_owned());
         }
         match unreadable(description, is_channel).filter(|_| !is_stamp) {
@@ -68,6 +71,9 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
     let layout = Layout::new(&names, naming, source)?;
     let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
     table.warnings = warnings;
+    // time stamps have a unit of their own
+    table.units = units(&reader, naming);
+    table.units.retain(|(channel, _)| !(has_stamps && *channel == Channel::Time));
     refuse_codecs(&reader, &kept, source)?;
     let is_text: Vec<bool> = layout.fields.iter().map(|field| matches!(field, Field::Text(_))).collect();
     sizes::check(reader.metadata().row_groups(), &kept, &is_text, pages, source)?;
@@ -97,6 +103,17 @@ fn decode(file: File, naming: &Naming, source: &Path) -> Result<Table, ReadError
         }
     }
     Ok(table)
+}
+
+/// The units of channels that the metadata of the file states, as a recording that was written does where it has to.
+fn units(reader: &SerializedFileReader<File>, naming: &Naming) -> Vec<(Channel, String)> {
+    let stated = reader.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+    let of_channel = |entry: &KeyValue| {
+        let channel = naming.channel(stated::column(&entry.key)?)?;
+        let unit = entry.value.as_deref().filter(|unit| *unit != "-")?;
+        Some((channel, unit.to_owned()))
+    };
+    stated.filter_map(of_channel).collect()
 }
 
 /// The unit of a column of time stamps, s.

@@ -1,6 +1,7 @@
 //! A recording as Parquet: numbers as nullable f64, NaN as null, unknown columns as text.
 //!
-//! One row group, Snappy. It has no options.
+//! One row group, Snappy. It has no options. Units are in the metadata of the file where a column would otherwise be taken for
+//! one in another (`stated.rs`).
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -8,11 +9,12 @@ use std::sync::Arc;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as PhysicalType};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use crate::{Cells, Outlet, Recording, Values};
+use crate::{Cells, Outlet, Recording, Values, stated};
 
 impl Recording {
     /// Writes the recording as Parquet, in the order of its columns.
@@ -21,7 +23,10 @@ impl Recording {
     /// What the writer says, or [`io::ErrorKind::InvalidInput`] for a column without one value a row.
     pub fn write_parquet(&self, writer: impl Write + Send) -> io::Result<()> {
         let outlets = self.even_outlets()?;
-        write(&outlets, writer).map_err(io::Error::other)
+        let units = self.stated_units(&outlets).unwrap_or_default();
+        let stated =
+            outlets.iter().zip(units).map(|((name, _), unit)| KeyValue::new(stated::key(name), unit.to_owned()));
+        write(&outlets, stated.collect(), writer).map_err(io::Error::other)
     }
 }
 
@@ -42,7 +47,7 @@ pub fn write_parquet(columns: &[(String, Values)], writer: impl Write + Send) ->
         })
         .collect::<Result<_, _>>()?;
     even(&outlets)?;
-    write(&outlets, writer).map_err(io::Error::other)
+    write(&outlets, Vec::new(), writer).map_err(io::Error::other)
 }
 
 /// Writes columns of numbers, borrowed, as Parquet, in their order.
@@ -52,7 +57,7 @@ pub fn write_parquet(columns: &[(String, Values)], writer: impl Write + Send) ->
 pub fn write_parquet_numbers(columns: &[(&str, &[f64])], writer: impl Write + Send) -> io::Result<()> {
     let outlets: Vec<(&str, Outlet<'_>)> = columns.iter().map(|(name, v)| (*name, Outlet::Numbers(v))).collect();
     even(&outlets)?;
-    write(&outlets, writer).map_err(io::Error::other)
+    write(&outlets, Vec::new(), writer).map_err(io::Error::other)
 }
 
 fn even(outlets: &[(&str, Outlet<'_>)]) -> io::Result<()> {
@@ -62,10 +67,12 @@ fn even(outlets: &[(&str, Outlet<'_>)]) -> io::Result<()> {
     Ok(())
 }
 
-fn write(outlets: &[(&str, Outlet<'_>)], writer: impl Write + Send) -> Result<(), ParquetError> {
+fn write(outlets: &[(&str, Outlet<'_>)], units: Vec<KeyValue>, writer: impl Write + Send) -> Result<(), ParquetError> {
     let fields = outlets.iter().map(|(name, outlet)| field(name, outlet).map(Arc::new)).collect::<Result<_, _>>()?;
     let schema = Arc::new(Type::group_type_builder("recording").with_fields(fields).build()?);
-    let properties = Arc::new(WriterProperties::builder().set_compression(Compression::SNAPPY).build());
+    let units = Some(units).filter(|units| !units.is_empty());
+    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).set_key_value_metadata(units);
+    let properties = Arc::new(properties.build());
     let mut file = SerializedFileWriter::new(writer, schema, properties)?;
     let mut group = file.next_row_group()?;
     for (_, outlet) in outlets {
