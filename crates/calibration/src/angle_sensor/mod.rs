@@ -2,6 +2,7 @@
 //! encoders, magnetometers, interferometers.
 mod agreement;
 mod autoregression;
+mod cross_axis;
 mod cross_validation;
 pub(crate) mod curve;
 mod deviations;
@@ -14,7 +15,10 @@ mod lines;
 pub(crate) mod model;
 mod rails;
 mod rate_alone;
+mod rate_deviations;
+mod rate_finding;
 pub(crate) mod rate_gyroscope;
+mod rate_regression;
 mod rate_runs;
 mod readout;
 mod readout_fit;
@@ -27,4 +31,4 @@ mod sensor;
 mod table_fit;
 mod units;
 
-pub(crate) use identify::{identify, serves};
+pub(crate) use identify::{identify, is_rate_gyroscope, serves};
