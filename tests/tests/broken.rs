@@ -382,7 +382,7 @@ fn of_two_runs_with_two_ratios_of_the_gains_the_interval_covers_both() {
         .to_vec();
     let told = |runs: &[Recording]| {
         let report = identified(runs.to_vec()).unwrap().report;
-        let is_said = report.warnings.iter().any(|w| w.contains("told apart by a run that no other bears out"));
+        let is_said = report.warnings.iter().any(|w| w.contains("separated by a run that no other bears out"));
         (report.detection_gain_ratio.unwrap(), is_said)
     };
     let (ratio, is_said) = told(&runs);

@@ -377,6 +377,18 @@ pub struct AllanPoint {
     pub ci95: [f64; 2],
 }
 
+/// How far the input axis of a rate gyroscope is off the plane across an axis that it was turned about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Misalignment {
+    /// the run about that axis
+    pub file: String,
+    /// the angle, deg; positive where the output goes with the rotation as it does about the input axis. Null where the run
+    /// does not identify it
+    pub angle_deg: Option<Estimate>,
+    /// why it is null
+    pub reason: Option<String>,
+}
+
 /// How the scale factor goes with the input rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleFactor {
@@ -482,6 +494,9 @@ pub struct Report {
     pub proposals: Vec<EffectText>,
     /// how the scale factor goes with the rate; null where fewer than three rates of both senses are there
     pub scale_factor: Option<ScaleFactor>,
+    /// how far the input axis is off the plane across other axes; absent without a run about one
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub misalignment: Vec<Misalignment>,
     /// how far the angle wanders at rest; null without a run at rest
     pub allan: Option<Allan>,
     /// how gain, bias and readout go with the temperature; null without two runs with one

@@ -73,6 +73,14 @@ fn require_a_reference(campaign: &Campaign) -> Result<(), Refusal> {
         let name = run.file.display().to_string();
         return Err(Refusal::new(&name, "virtual precession has no reference", "cvg_calibration::answer"));
     }
+    if let Some(run) = campaign.runs.iter().find(|r| r.kind == RunKind::CrossAxis)
+        && !angle_sensor::is_rate_gyroscope(campaign)
+    {
+        let wanted =
+            "runs with theta_deg alone, kind = \"rotation\" about the input axis among them, and period_deg = 360.0";
+        let what = "a run across the input axis is one of a rate gyroscope";
+        return Err(Refusal::new(&run.file.display().to_string(), what, wanted));
+    }
     if campaign.reference == Some(Reference::Absent) {
         let wanted = "rate_dps or table_deg, or instrument = \"sensor\"";
         return Err(Refusal::new(

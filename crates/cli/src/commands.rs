@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::{Campaign, Instrument, read_text};
+use cvg_calibration::recording::{Campaign, read_text};
 use cvg_calibration::report::refused::{About, Refused};
 use cvg_calibration::{Answer, Cause, EffectText, Identification, Options};
 use cvg_model::effects::EffectId;
@@ -14,8 +14,7 @@ use crate::arguments::Arguments;
 use crate::failure::line_and_column;
 use crate::limits::Limits;
 use crate::progress::Progress;
-use crate::report::further::{Number, further};
-use crate::report::significant;
+use crate::report::summary::summary;
 use crate::{Failure, input, output, report};
 
 /// `cvg simulate`
@@ -232,67 +231,4 @@ pub(crate) fn manual(out: &Path) -> Result<(), Failure> {
     output::write_all(out, &files, &[])?;
     output::tell(format_args!("wrote {} pages into {}", files.len(), out.display()));
     Ok(())
-}
-
-/// What a person wants to read first.
-pub(crate) fn summary(identified: &Identification) -> String {
-    use std::fmt::Write as _;
-    let r = &identified.report;
-    let mut s = String::new();
-    let mut line = |text: String| {
-        let _ = writeln!(s, "{text}");
-    };
-    line(format!("{} ({})", r.device, r.instrument));
-    let raw = r.heldout.raw.map_or("raw angle does not turn".to_owned(), |e| format!("raw {:.5}°", e.rms_deg));
-    line(format!(
-        "  held-out angle error, rms   {raw} → declared {:.5}° → discovered {:.5}°   (noise floor {:.5}°)",
-        r.heldout.declared.rms_deg, r.heldout.discovered.rms_deg, r.heldout.noise_floor_deg
-    ));
-    let estimate = |e: &Option<cvg_calibration::report::Estimate>| {
-        e.as_ref()
-            .filter(|e| e.is_told())
-            .map_or("not told by this campaign".to_owned(), |e| format!("{:.6} ± {:.1e}", e.value, e.half_width()))
-    };
-    if r.instrument == Instrument::Sensor.name() {
-        let k = r.angular_gain.value;
-        let told = if k == k.trunc() {
-            pole_pairs(k, identified.calibration.hypothesis.sense())
-        } else {
-            estimate(&Some(r.angular_gain))
-        };
-        line(format!("  periods a turn              {told}"));
-        line(format!("  gain of Y over X            {}", estimate(&r.detection_gain_ratio)));
-    } else {
-        line(format!("  angular gain k              {}", estimate(&Some(r.angular_gain))));
-        line(format!("  detection gain G_Dy/G_Dx    {}", estimate(&r.detection_gain_ratio)));
-        line(format!("  actuation gain G_Ax/G_Ay    {}", estimate(&r.actuation_gain_ratio)));
-    }
-    for e in &r.effects {
-        let parameters = e.parameters.iter().map(|p| {
-            let unit = if p.unit == "1" { "" } else { &p.unit };
-            format!("{} = {} {unit}", p.name, significant(p.value)).trim_end().to_owned()
-        });
-        let origin = format!("{:?}", e.origin).to_lowercase();
-        line(format!("  {:<11} {:<26} {}", origin, e.id, parameters.collect::<Vec<_>>().join(", ")));
-    }
-    for u in &r.unexplained {
-        let n = u.n.map(|n| format!(" n = {n}")).unwrap_or_default();
-        let f = u.frequency_hz.map(|f| format!(" {f:.4} Hz")).unwrap_or_default();
-        line(format!("  unexplained {}{n}{f}: {:.5}° rms; {}", u.class, u.rms_deg, u.suggestion));
-    }
-    for Number { name, value, unit } in further(r) {
-        line(format!("  {name:<27} {} ± {:.1e} {unit}", significant(value.value), value.half_width()));
-    }
-    for w in &r.warnings {
-        line(format!("  warning: {w}"));
-    }
-    s
-}
-
-/// A whole number of periods a turn, as who built the sensor calls it. By Equation 1 a positive k counts against the turn; k has
-/// the sign that the campaign states, and `sense` is what was seen: −1 as in Equation 1.
-fn pole_pairs(k: f64, sense: f64) -> String {
-    let sense = if sense * k > 0.0 { "with the reference" } else { "reversed: against the reference" };
-    let pairs = if k.abs() == 1.0 { "1 period a turn".to_owned() } else { format!("{} pole pairs", k.abs()) };
-    format!("{k}: {pairs}, counting {sense}")
 }

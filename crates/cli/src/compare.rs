@@ -8,7 +8,7 @@ use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::read_text;
 use serde_json::{Value, json};
 
-use crate::report::significant;
+use crate::report::numbers::{interval, significant, with_half_width};
 use crate::{Failure, output};
 
 /// A parameter of one answer.
@@ -197,14 +197,16 @@ impl Pair {
 
 fn in_words(pairs: &[Pair]) -> String {
     let columns = ["parameter", "A", "B", "B − A", "± 95 %", "unit", ""].map(str::to_owned);
-    let value = |v: Option<f64>| v.map_or("—".to_owned(), significant);
+    let or_none = |text: Option<String>| text.unwrap_or("—".to_owned());
     let mut rows = vec![columns];
     rows.extend(pairs.iter().map(|p| {
-        let of = |i: usize| value(p.of[i].as_ref().map(|p| p.value));
-        let brief = |v: Option<f64>| v.map_or("—".to_owned(), |v| format!("{v:.2e}"));
-        let words = [of(0), of(1), brief(p.difference()), brief(p.combined()), p.unit.clone(), p.verdict().to_owned()];
-        let [a, b, d, c, unit, verdict] = words;
-        [p.name.clone(), a, b, d, c, unit, verdict]
+        let own = |p: &Parameter| p.ci95.map_or(significant(p.value), |ci95| interval(p.value, ci95)[0].clone());
+        let of = |i: usize| or_none(p.of[i].as_ref().map(own));
+        let [d, c] = match (p.difference(), p.combined()) {
+            (Some(d), Some(c)) => with_half_width(d, c),
+            (d, _) => [or_none(d.map(significant)), or_none(None)],
+        };
+        [p.name.clone(), of(0), of(1), d, c, p.unit.clone(), p.verdict().to_owned()]
     }));
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..7).map(width).collect();
@@ -224,7 +226,7 @@ fn in_words(pairs: &[Pair]) -> String {
     let moved: Vec<&str> = pairs.iter().filter(|p| p.moved() == Some(true)).map(|p| p.name.as_str()).collect();
     let _ = match moved.as_slice() {
         [] if pairs.iter().all(|p| p.moved().is_none()) => {
-            writeln!(s, "nothing is told by both with an interval: whether something moved is not told")
+            writeln!(s, "no number has an interval in both reports, without which nothing says whether something moved")
         }
         [] => writeln!(s, "nothing moved beyond the combined 95 % intervals"),
         names => writeln!(s, "moved beyond the combined 95 % intervals: {}", names.join(", ")),

@@ -29,7 +29,7 @@ pub(crate) fn demo(out: &Path, json: bool) -> Result<(), Failure> {
         output::answer(&format!("{}\n", report::json(&identified)?))?;
         return Ok(());
     }
-    output::answer(&commands::summary(&identified))?;
+    output::answer(&report::summary::summary(&identified))?;
     output::answer(&beside_the_paper(&identified))?;
     output::tell(format_args!("wrote {}", out.join("report.html").display()));
     Ok(())

@@ -181,6 +181,7 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
     let kind = kind.map_or("", |k| match k {
         RunKind::Rotation => ", a rotation",
         RunKind::Ringdown { .. } => ", a ring-down",
+        RunKind::CrossAxis => ", turned across the input axis",
         RunKind::Static => ", at rest",
         RunKind::Decay => ", a free decay",
         RunKind::Virtual => ", virtual precession",

@@ -164,7 +164,7 @@ impl Verdict {
     #[must_use]
     pub fn line(&self, device: &str) -> String {
         let word = if self.passes { "pass" } else { "FAIL" };
-        let value = self.value.map_or("not told".to_owned(), |value| value.to_string());
+        let value = self.value.map_or("not identifiable".to_owned(), |value| value.to_string());
         let end = |word: &str, v: Option<f64>| v.map(|v| format!("{word} {v}"));
         let ends = [end("min", self.min), end("max", self.max)].into_iter().flatten().collect::<Vec<_>>().join(", ");
         format!("{word}  {device}  {} = {value}  ({ends})", self.path)

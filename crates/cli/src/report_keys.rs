@@ -53,6 +53,7 @@ const NUMBERS: &[&str] = &[
     "proposals.**",
     "scale_factor.nonlinearity_ppm~",
     "scale_factor.asymmetry_ppm~",
+    "misalignment.*.angle_deg~",
     "allan.angle_random_walk_deg_sqrt_h~",
     "allan.bias_instability_dph~",
     "allan.bias_instability_tau_s",

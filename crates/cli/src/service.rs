@@ -240,7 +240,7 @@ impl Answered {
     #[must_use]
     pub fn summary(&self) -> String {
         match &self.answer {
-            Answer::Identified(identified) => commands::summary(identified),
+            Answer::Identified(identified) => report::summary::summary(identified),
             Answer::Surveyed(surveyed) => report::survey::summary(&surveyed.report),
         }
     }

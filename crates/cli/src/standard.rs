@@ -4,6 +4,8 @@
 
 use cvg_calibration::report::{Report, RunReport};
 
+use crate::report::numbers::{NOT_IDENTIFIABLE, estimated};
+
 /// One term and its value.
 pub(crate) struct Entry {
     /// term
@@ -23,7 +25,7 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
         entry(
             "scale factor",
             "angular gain k: pattern angle per input angle",
-            if k.is_told() { format!("{:.7} ± {:.1e}", k.value, k.half_width()) } else { "not told".into() },
+            if k.is_told() { estimated(&k) } else { NOT_IDENTIFIABLE.into() },
         ),
         entry(
             "scale factor",
@@ -45,12 +47,12 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
         out.push(entry(
             "drift, dependent on angle",
             "effect anisodamping: largest drift of the pattern, ½Δ(1/τ)",
-            anisodamping_drift(r).unwrap_or("not told by this campaign".into()),
+            anisodamping_drift(r).unwrap_or(NOT_IDENTIFIABLE.into()),
         ));
         out.push(entry(
             "angle storage",
             "rate below which the pattern locks, Δ(1/τ)/(2k)",
-            threshold(r).unwrap_or("not told by this campaign".into()),
+            threshold(r).unwrap_or(NOT_IDENTIFIABLE.into()),
         ));
         let mut downs = r.runs.iter().filter_map(|x| x.tau_s.map(|t| (x, t))).peekable();
         if downs.peek().is_none() {
@@ -58,9 +60,12 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
         }
         for (run, tau) in downs {
             let name = std::path::Path::new(&run.file).file_name().unwrap_or_default().to_string_lossy();
-            let value = format!("{:.4} ± {:.4} s ({name})", tau.value, tau.half_width());
+            let value = format!("{} s ({name})", estimated(&tau));
             out.push(entry("run-down time constant", "decay time constant of the amplitude, τ", value));
         }
+    }
+    if r.instrument == "gyroscope" && !has_pattern {
+        out.extend(misalignment(r));
     }
     let ppm = |k: &RunReport| Some(1e6 * k.angular_gain?.value / r.angular_gain.value);
     let repeated = |of: &dyn Fn(&RunReport) -> Option<f64>, unit: &str| {
@@ -80,6 +85,21 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
     }
     out.push(entry("output noise", "white part of the angle error, rms", format!("{:.6}°", r.heldout.noise_floor_deg)));
     out
+}
+
+/// The misalignment of a rate gyroscope towards each axis that it was turned about.
+fn misalignment(r: &Report) -> Vec<Entry> {
+    let here = "angle of the input axis off the plane across the axis of a cross-axis run";
+    let entry = |value: String| Entry { term: "input axis misalignment", here, value };
+    if r.misalignment.is_empty() {
+        let wanted = "a run there and back about an axis across the input axis, kind = \"cross-axis\"";
+        return vec![entry(format!("{NOT_IDENTIFIABLE}: {wanted}"))];
+    }
+    let said = r.misalignment.iter().map(|m| match (&m.angle_deg, &m.reason) {
+        (Some(angle), _) => format!("{} deg ({})", estimated(angle), m.file),
+        (None, reason) => format!("{}: {}", m.file, reason.as_deref().unwrap_or(NOT_IDENTIFIABLE)),
+    });
+    said.map(entry).collect()
 }
 
 /// Runs below which a spread is none.

@@ -104,6 +104,36 @@ fn the_mapping_that_is_suggested_for_a_name_that_ends_like_a_factor_is_read() {
     assert!(said.contains("one every 0.100000 s"), "{said}");
 }
 
+/// `numpy.savetxt` and others write their header as a remark.
+#[test]
+fn a_header_in_a_remark_above_numbers_is_a_header_whatever_its_names() {
+    let bench = Bench::small();
+    let numbers = "0|310.5|120.25|1.5\n50|311.0|121.5|1.75\n100|312.5|122.0|2.0\n";
+    for mark in ["%", "#"] {
+        bench.write(
+            "fringes.dat",
+            format!("{mark} HeNe double pass\n{mark} t [us]|PD1 [nA]|PD2 [nA]|stage [nm]\n{numbers}"),
+        );
+        let refused = cvg(&[OsStr::new("inspect"), bench.path("fringes.dat").as_os_str()]);
+        assert!(refused.stdout.contains("3 rows") && refused.stdout.contains("PD1 [nA]"), "{mark}: {}", refused.stdout);
+        assert!(refused.stderr.contains("--map 't_s=t [us]'"), "{mark}: {}", refused.stderr);
+    }
+    // a remark that is none stays one
+    bench.write("fringes.dat", format!("# HeNe double pass\n{numbers}"));
+    let refused = cvg(&[OsStr::new("inspect"), bench.path("fringes.dat").as_os_str()]);
+    assert!(refused.stderr.contains("wanted a header line"), "{}", refused.stderr);
+}
+
+#[test]
+fn two_factors_in_a_mapping_are_told_that_it_takes_one() {
+    let bench = Bench::small();
+    let name = bench.recordings("rot").remove(0);
+    let file = bench.path(&name);
+    let map = OsStr::new("table_deg=rate_dps*360/8192");
+    let refused = cvg(&[OsStr::new("identify"), file.as_os_str(), OsStr::new("--map"), map]);
+    assert!(refused.stderr.contains("takes one factor or one divisor, as in `rate_dps*0.5`"), "{}", refused.stderr);
+}
+
 #[test]
 fn a_compressed_recording_is_compensated_under_the_name_of_its_text() {
     let bench = Bench::small();

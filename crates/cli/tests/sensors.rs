@@ -451,7 +451,7 @@ fn an_angle_in_counts_or_in_radians_is_told_what_it_looks_like() {
     };
     let counts = given(&[&written(&folder, "word.csv", &word(16384.0, true))]);
     assert!(
-        counts.status == 1 && counts.stderr.contains("counts of 14 bits (theta_deg = \"…/45.511111\""),
+        counts.status == 1 && counts.stderr.contains("counts of 14 bits; wanted: degrees: theta_deg = \"…/45.511111\""),
         "{}",
         counts.stderr
     );

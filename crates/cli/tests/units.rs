@@ -44,6 +44,8 @@ fn an_angle_in_another_unit_is_told_the_factor_that_takes_it_to_degrees() {
         ("mrad", 1e-3f64.to_degrees(), "*0.05729578"),
         ("arc seconds", 1.0 / 3600.0, "/3600"),
         ("mdeg", 1e-3, "/1000"),
+        ("arc minutes", 1.0 / 60.0, "/60"),
+        ("mils of 6400 a turn", 0.05625, "*0.05625"),
     ];
     for (name, degrees, by) in units {
         for (column, scales) in [("table_deg", [degrees, 1.0]), ("theta_deg", [1.0, degrees])] {
@@ -60,6 +62,34 @@ fn an_angle_in_another_unit_is_told_the_factor_that_takes_it_to_degrees() {
                 assert!(!mapped.stdout.contains("whole number"), "{map}: {}", mapped.stdout);
             }
         }
+    }
+}
+
+/// A position word is whole turns of a power of two: as a unit it is its counts, whatever number of periods another would make.
+#[test]
+fn counts_of_a_converter_are_named_with_the_divisor_that_makes_degrees() {
+    let folder = TempDir::new().unwrap();
+    for (bits, by) in [(12, "/11.377778"), (17, "/364.088889"), (20, "/2912.711111")] {
+        let file = turned(&folder, [1.0, 360.0 / f64::from(1 << bits)], true, 0.3);
+        // wrapped at a turn, in whole counts
+        let text = fs::read_to_string(&file).unwrap();
+        let counted = text.lines().enumerate().map(|(at, line)| {
+            let (beside, angle) = line.rsplit_once(',').unwrap();
+            let count = |v: f64| v.rem_euclid(f64::from(1 << bits)).floor();
+            if at == 0 { line.to_owned() } else { format!("{beside},{}", count(angle.parse().unwrap())) }
+        });
+        fs::write(&file, counted.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+        let refused = identified(&file, &[]);
+        assert!(
+            refused.status == 1 && refused.stderr.contains(&format!("counts of {bits} bits")),
+            "{}",
+            refused.stderr
+        );
+        assert!(refused.stderr.contains(&format!("…{by}\"")), "{}", refused.stderr);
+        let map = format!("theta_deg=theta_deg{by}");
+        let mapped = identified(&file, &[OsStr::new("--map"), OsStr::new(&map)]);
+        assert_eq!(mapped.status, 0, "{map}: {}", mapped.stderr);
+        assert!(mapped.stdout.contains("1 period a turn"), "{map}: {}", mapped.stdout);
     }
 }
 

@@ -235,7 +235,11 @@ pub enum ReadError {
         what: String,
     },
     /// A column that a channel is mapped to is not there.
-    #[error("{}: `{channel}` is mapped to a column `{column}` that is not there; there are {present}", path.display())]
+    #[error(
+        "{}: `{channel}` is mapped to a column `{column}` that is not there{}; there are {present}",
+        path.display(),
+        crate::naming::one_factor(column)
+    )]
     MappedColumn {
         /// The path as given.
         path: PathBuf,

@@ -149,6 +149,12 @@ pub fn mapped_name(column: &str) -> String {
     if factored(column).1.is_some() { format!("{column}*1") } else { column.to_owned() }
 }
 
+/// What to say of a column that is not there and looks like one with a factor: there was another behind it.
+pub(crate) fn one_factor(column: &str) -> String {
+    let (name, factor) = factored(column);
+    factor.map_or(String::new(), |_| format!(" (a mapping takes one factor or one divisor, as in `{name}*0.5`)"))
+}
+
 /// A column, and the number that it is multiplied by or, as a reciprocal, divided by.
 fn factored(text: &str) -> (&str, Option<f64>) {
     let number = text.rfind(['*', '/']).and_then(|at| {

@@ -140,14 +140,16 @@ fn angle_deg(unit: &str) -> Option<f64> {
 
 /// An angle over a time, and the rates that have a name of their own.
 fn rate_dps(unit: &str) -> Option<f64> {
-    if let Some((angle, time)) = unit.split_once('/') {
-        return Some(angle_deg(angle)? / time_s(time)?);
+    if let Some((angle, time)) = unit.split_once('/')
+        && let Some(angle) = angle_deg(angle)
+    {
+        return Some(angle / time_s(time)?);
     }
     Some(match unit {
         "dps" => 1.0,
         "mdps" => 1e-3,
         "dph" => 1.0 / 3600.0,
-        "rpm" => 6.0,
+        "rpm" | "r/min" | "u/min" | "tr/min" | "1/min" => 6.0,
         "rps" => 360.0,
         _ => return None,
     })

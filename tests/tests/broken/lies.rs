@@ -21,7 +21,7 @@ const ROUTINE: &[&str] = &[
     "the campaign cannot tell the",
     "is confounded with",
     "the reference was commanded and not measured",
-    "are told apart by a run that no other bears out",
+    "are separated by a run that no other bears out",
     "samples were set aside as spikes",
 ];
 

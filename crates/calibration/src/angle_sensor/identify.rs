@@ -2,15 +2,15 @@
 //! once at the end, and a report of it all.
 
 use super::circle;
+use super::cross_axis;
 use super::deviations::{Deviations, deviations, own_gain_ratios};
 use super::effects::Described;
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
-use super::rate_gyroscope::{RateGyroscope, T_PARTS};
-use super::rate_regression::Term;
+use super::rate_finding::rate_finding;
 use super::rate_runs;
 use super::readout::Kind;
-use super::report::{ByItself, Errors, Finding, Head, report};
+use super::report::{Errors, Finding, Head, report};
 use super::samples::{SensorRun, apart, prepare};
 use super::screening::believed;
 use super::sensor::other_unit;
@@ -20,12 +20,12 @@ use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
 use crate::identified::{Identification, Options, not_tried};
-use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::model::hypothesis::Hypothesis;
 use crate::numerics::statistics::{median, span};
-use crate::recording::{Campaign, Instrument, RunKind};
+use crate::recording::{Campaign, Instrument, Run, RunKind};
 use crate::report::gate::least_held_out;
 use crate::report::inference::{CONTRADICTS, covering};
-use crate::report::{EffectReport, Estimate, ParameterReport, Share};
+use crate::report::{Estimate, Share};
 use cvg_model::effects::{EffectId, Stage};
 
 /// A campaign without a pattern: an angle sensor, or the integrated output of a rate gyroscope, whose angle goes round once
@@ -34,13 +34,17 @@ pub(crate) fn serves(campaign: &Campaign) -> bool {
     campaign.instrument == Instrument::Sensor || is_rate_gyroscope(campaign)
 }
 
-fn is_rate_gyroscope(campaign: &Campaign) -> bool {
+/// A gyroscope whose only output is an angle that goes round once a turn, turned about its input axis and perhaps others.
+pub(crate) fn is_rate_gyroscope(campaign: &Campaign) -> bool {
+    let of_one = |run: &Run| {
+        matches!(run.kind, RunKind::Rotation | RunKind::CrossAxis)
+            && run.recording.theta_deg.is_some()
+            && run.recording.xc_v.is_none()
+    };
     campaign.instrument == Instrument::Gyroscope
         && campaign.period_deg == Some(360.0)
-        && campaign
-            .runs
-            .iter()
-            .all(|r| r.kind == RunKind::Rotation && r.recording.theta_deg.is_some() && r.recording.xc_v.is_none())
+        && campaign.runs.iter().all(of_one)
+        && campaign.runs.iter().any(|run| run.kind == RunKind::Rotation)
 }
 
 /// Harmonics of the position in the decomposition; rows that each of its unknowns needs.
@@ -71,7 +75,10 @@ pub(crate) fn identify(
     let sense = campaign.angular_gain.map(f64::signum);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let rates_alone = campaign.runs.iter().all(|run| run.recording.table_deg.is_none());
+    // runs are known by their number among those about the input axis
+    campaign.runs.sort_by_key(|run| run.kind == RunKind::CrossAxis);
     let head = Head::of(&campaign);
+    let across = cross_axis::take(&mut campaign);
     (options.progress)("preparing the runs");
     let mut left_out = Vec::new();
     if rate_gyroscope {
@@ -106,7 +113,13 @@ pub(crate) fn identify(
     finding.warnings.extend(left_out);
     finding.warnings.extend(why_not);
     (options.progress)("measuring the held-out error");
-    report(head, finding, &fitted, &held, with_plots)
+    let unit = other_unit(&fitted, period).filter(|_| stated.is_none() && !rate_gyroscope);
+    let mut identified = report(head, finding, &fitted, &held, with_plots).map_err(|refusal| match unit {
+        Some(unit) => Refusal { wanted: format!("{}; {unit}", refusal.wanted), ..refusal },
+        None => refusal,
+    })?;
+    cross_axis::add(&mut identified.report, across)?;
+    Ok(identified)
 }
 
 fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
@@ -200,10 +213,11 @@ fn identified(
     mut texts: Vec<EffectId>,
 ) -> Result<(SensorModel, Deviations), Refusal> {
     loop {
-        let model = SensorModel::identify(stated, period, runs, &texts)?;
-        let deviations = deviations(&model, &thinned(runs));
+        let mut model = SensorModel::identify(stated, period, runs, &texts)?;
+        let mut deviations = deviations(&model, &thinned(runs));
         let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
         if unsure.is_empty() {
+            model.without_motion_by_chance(&mut deviations);
             return Ok((model, deviations));
         }
         texts.retain(|id| !unsure.contains(id));
@@ -323,134 +337,15 @@ fn counts_against(ratio: Option<Estimate>) -> String {
     )
 }
 
-fn rate_finding(
-    stated: Option<f64>,
-    period: f64,
-    runs: &[SensorRun],
-    held: &[SensorRun],
-) -> Result<Finding<'static>, Refusal> {
-    let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
-        Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
-    })?;
-    let (gain, deviation) = model.gain;
-    let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
-    let value = sign * gain.abs();
-    let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
-    let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
-    neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
-    let mut hypothesis =
-        Hypothesis { angular_gain: value, rate_bias_rad_s: model.value(Term::Bias), ..neutral_hypothesis.clone() };
-    let latency = -model.value(Term::Lag) / gain;
-    if latency != 0.0 {
-        let values = [latency, 0.0, 0.0, 0.0];
-        hypothesis.members.push(Member {
-            id: EffectId::AngleLatency,
-            values,
-            origin: Origin::Discovered,
-            refined: true,
-        });
-    }
-    let thinned = thinned(runs);
-    let samples = model.sensor.samples(&thinned, None);
-    let mut warnings = Vec::new();
-    if deviation.is_none() {
-        warnings.push(
-            "the runs turn at one rate, at which a scale factor is not told from a bias: what is wrong stands as a bias, and \
-             the angular gain's interval says nothing; a run at another rate, or back, tells them apart"
-                .into(),
-        );
-    }
-    if let Some(lag) = model.lag_of_one_place {
-        warnings.push(format!(
-            "the angle and its reference part at one place only, where the rate changes, as a lag of {:.3} ms makes them: one place \
-             does not tell a lag from a slip, and it is left as it is; runs that turn back several times tell",
-            1e3 * lag
-        ));
-    }
-    if model.bias_varies {
-        warnings
-            .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
-    }
-    warnings.extend(runs.iter().chain(held).filter_map(|run| rate_runs::parting(run, &model.left(run))));
-    let sensor = model.sensor;
-    let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
-    Ok(Finding {
-        instrument: Instrument::Gyroscope,
-        stated_gain: Some(stated.unwrap_or(1.0)),
-        reason: (!model.answered).then(|| {
-            "bias, scale factor and lag predict parts of the runs that were left out worse than nothing does".into()
-        }),
-        angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
-        detection_gain_ratio: None,
-        effects: rate_effects(&model),
-        hypothesis,
-        neutral_hypothesis,
-        decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
-        warnings,
-        raw: Some(Box::new(raw)),
-        declared: Box::new(raw),
-        alone: model.answered.then(|| -> ByItself<'_> {
-            let model = model.clone();
-            Box::new(move |run| model.alone(run))
-        }),
-        discovered: Box::new(move |run| model.left(run)),
-        readout: None,
-        direction: Box::new(move |run| {
-            sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
-        }),
-        period,
-    })
-}
-
-fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
-    if !model.answered {
-        return Vec::new();
-    }
-    let evidence = format!(
-        "left-out fifths of the runs scatter by {:.4}° with it and {:.4}° without (geometric mean); interval by jackknife",
-        model.predicted.to_degrees(),
-        model.predicted_raw.to_degrees()
-    );
-    let gain = model.gain.0;
-    let effect = |id: EffectId, origin, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
-        id: id.description().id.into(),
-        origin,
-        parameters: vec![ParameterReport {
-            name: name.into(),
-            unit: unit.into(),
-            value,
-            ci95: Some([value - T_PARTS * deviation, value + T_PARTS * deviation]),
-        }],
-        heldout_rms_deg: None,
-        evidence: format!("{}; {evidence}", id.description().signature),
-        confounded_with: Vec::new(),
-        separated_by: None,
-    };
-    let terms = model.terms.iter().filter(|t| t.1 != 0.0);
-    terms
-        .filter_map(|&(term, value, deviation)| match term {
-            Term::Bias => {
-                Some(effect(EffectId::RateOffset, Origin::Discovered, "rate_offset", "rad/s", value, deviation))
-            }
-            Term::Lag => {
-                let (value, deviation) = (-value / gain, deviation / gain.abs());
-                Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
-            }
-            // the scale factor is k, and a run's own bias is no effect of the instrument
-            Term::Scale | Term::BiasOf(_) => None,
-        })
-        .collect()
-}
-
 /// Runs thinned together to what a jackknife is made on.
-fn thinned(runs: &[SensorRun]) -> Vec<SensorRun> {
+pub(super) fn thinned(runs: &[SensorRun]) -> Vec<SensorRun> {
     let rows: usize = runs.iter().map(SensorRun::len).sum();
     let stride = (rows / ENOUGH_ROWS).max(1);
     runs.iter().map(|r| r.thinned(stride)).collect()
 }
 
 /// What the declared residual is a function of.
-fn take_apart(samples: &[Sample], runs: &[SensorRun], cycles: f64, gain: f64) -> Vec<Share> {
+pub(super) fn take_apart(samples: &[Sample], runs: &[SensorRun], cycles: f64, gain: f64) -> Vec<Share> {
     let n = samples.len();
     let period = std::f64::consts::TAU / cycles;
     let turns = runs.iter().map(|r| r.travel_rad() * gain.abs() / period).fold(0.0, f64::max);

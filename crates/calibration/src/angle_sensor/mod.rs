@@ -3,6 +3,7 @@
 mod agreement;
 mod autoregression;
 mod circle;
+mod cross_axis;
 mod cross_validation;
 pub(crate) mod curve;
 mod deviations;
@@ -15,6 +16,8 @@ mod lines;
 pub(crate) mod model;
 mod rails;
 mod rate_alone;
+mod rate_deviations;
+mod rate_finding;
 pub(crate) mod rate_gyroscope;
 mod rate_regression;
 mod rate_runs;
@@ -29,4 +32,4 @@ mod sensor;
 mod table_fit;
 mod units;
 
-pub(crate) use identify::{identify, serves};
+pub(crate) use identify::{identify, is_rate_gyroscope, serves};

@@ -4,14 +4,16 @@ use cvg_model::effects::EffectId;
 
 use super::circle;
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
+use super::deviations::Deviations;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, centre, fit};
 use super::samples::SensorRun;
 use super::selection::{Selected, Selection, fit_from, starts};
 use super::sensor::Sensor;
-use super::table_fit::{Sample, Shape, TableFit};
+use super::table_fit::{Motion, Sample, Shape, TableFit};
 use super::{autoregression, ellipse};
+use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
 
 /// Rows of the last fit; more would not narrow what still means something.
@@ -72,7 +74,7 @@ impl SensorModel {
         let refusal = || {
             Refusal::no_answer(
                 "campaign",
-                "no model of the sensor can be told from its rows",
+                "no model of the sensor can be identified from its rows",
                 "more stations, or a longer recording",
             )
         };
@@ -83,6 +85,22 @@ impl SensorModel {
             selected.iter().filter_map(|s| Self::fitted(sensor, s, &thinned, rails, &starts)).collect();
         let answered = models.iter().find(|m| m.outcome == Outcome::Answered);
         answered.or(models.first()).cloned().ok_or_else(refusal)
+    }
+
+    /// Takes out that the angle follows motion, where no number of it is further from nothing than its interval. What is left
+    /// then may be the sensor as it is.
+    pub(crate) fn without_motion_by_chance(&mut self, deviations: &mut Deviations) {
+        let of_motion = ..self.table.shape.motion.size();
+        let mut shown = self.table.side[of_motion].iter().zip(&deviations.side[of_motion]);
+        if of_motion.end == 0 || shown.any(|(value, deviation)| value.abs() > STUDENT_19 * deviation) {
+            return;
+        }
+        self.table.side.drain(of_motion);
+        deviations.side.drain(of_motion);
+        self.table.shape.motion = Motion::None;
+        if self.table.shape.size() == 0 && self.front().is_none_or(|front| front.kind == Kind::Plain) {
+            self.outcome = Outcome::Neutral;
+        }
     }
 
     fn fitted(

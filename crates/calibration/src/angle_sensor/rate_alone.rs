@@ -3,7 +3,8 @@
 //! A run that turns there and back tells both at once, and what a lag makes beside them is kept out of either. Of a run that
 //! turns one way at one rate they are one number: each is told as it is where the other is that of all runs.
 
-use super::rate_gyroscope::{RateGyroscope, T_PARTS, estimates, jackknife, splits, tell_scale};
+use super::rate_deviations::{T_PARTS, deviations};
+use super::rate_gyroscope::{RateGyroscope, estimates, splits, tell_scale};
 use super::rate_regression::{ErrorLaw, Stretch, Term, estimate};
 use super::samples::SensorRun;
 use crate::report::Estimate;
@@ -18,7 +19,7 @@ pub(crate) struct Alone {
 impl RateGyroscope {
     /// What this run tells by itself; `None` where it has too few rows to leave parts of them out.
     pub(crate) fn alone(&self, run: &SensorRun) -> Option<Alone> {
-        let stretch = [Stretch::new(run, 0, &self.sensor)?];
+        let stretch = [Stretch::new(run, 0, &self.sensor, self.latency_s())?];
         if tell_scale(&stretch) {
             let [bias, scale] = found(&stretch, &[Term::Bias, Term::Scale, Term::Lag])?;
             return Some(Alone { bias, gain: scale.turned(self.sensor.gain) });
@@ -34,16 +35,16 @@ impl RateGyroscope {
 }
 
 /// The first of these terms.
-fn found<const N: usize>(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimate; N]> {
+pub(super) fn found<const N: usize>(stretch: &[Stretch], terms: &[Term]) -> Option<[Estimate; N]> {
     let splits = splits(stretch);
     if splits.len() < 2 {
         return None;
     }
     let law = ErrorLaw::likelier(stretch, terms);
     let values = estimate(stretch, terms, law);
-    let deviations = jackknife(&estimates(stretch, &splits, terms, law).0, terms.len());
+    let spread = deviations(stretch, terms, &values, &estimates(stretch, &splits, terms, law).0);
     Some(std::array::from_fn(|i| {
-        let half = T_PARTS * deviations[i];
+        let half = T_PARTS * spread[i];
         Estimate { value: values[i], ci95: [values[i] - half, values[i] + half] }
     }))
 }

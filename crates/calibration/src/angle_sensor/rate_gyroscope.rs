@@ -1,6 +1,6 @@
 //! Rate gyroscopes whose integrated output stands against a reference angle: bias, scale factor and lag.
 //!
-//! $$e = b\\,t + s\\,α + l\\,Ω + \text{const}$$
+//! $$e = b\\,t + s\\,α + l\\,\overline{Ω}_l + \text{const}$$
 //!
 //! of the angle, each run about its own mean, by least squares or by least absolute deviations, whichever law makes the errors
 //! likelier. What such a gyroscope is wrong by besides comes of turns about its other axes, which end where they began as often
@@ -12,22 +12,27 @@
 //! instrument.
 
 use super::cross_validation::Folds;
-use super::rate_regression::{ErrorLaw, Row, Stretch, Term, estimate, rows, solved, variance};
+use super::rate_deviations::{deviations, of_a_walk};
+use super::rate_regression::{ErrorLaw, Row, Stretch, Term, ago, estimate, mean_rates, rows, solved, variance};
 use super::samples::SensorRun;
 use super::sensor::Sensor;
 
 /// A lag is kept where the rms of blocks that were left out in turn falls by at least this share.
 const LEAST_FALL: f64 = 0.01;
+/// … and a response is said where it falls by this share beside the lag.
+const RESPONSE_FALL: f64 = 0.3;
 /// Share of the reference's variance beside a line in time, below which a scale factor is not told from a bias.
 const TOLD_FROM_A_LINE: f64 = 1e-4;
 /// Parts of a run, each left out once.
 const PARTS: usize = 5;
-/// Student's 97.5 % point for one fewer than five parts.
-pub(super) const T_PARTS: f64 = 2.776;
 /// Standard errors by which left-out parts have to be predicted worse than by nothing for a fit to be refused.
 const HARMS: f64 = 2.0;
 /// A lag is told where every part that is left out leaves this share of what tells it.
 const LEFT_BY_A_PART: f64 = 0.01;
+/// Student's 95 % point for the blocks of a run.
+const BY_CHANCE: f64 = 1.68;
+/// Rounds in which a lag settles, each with a smaller rest.
+const MOST_ROUNDS: usize = 8;
 /// Rows that a part needs to be fitted with.
 const FEWEST_ROWS: usize = 10;
 
@@ -92,16 +97,34 @@ fn told(stretches: &[Stretch], folds: &Folds) -> Vec<Term> {
     if left(&with_lag) < (1.0 - LEAST_FALL) * left(&terms) { with_lag } else { terms }
 }
 
+/// A lag, among these terms, that a random walk of the angle makes as well: of one that goes with a few steps of the rate,
+/// blocks that are left out in between say nothing.
+fn lag_by_chance(stretches: &[Stretch], terms: &[Term]) -> bool {
+    let values = estimate(stretches, terms, ErrorLaw::Normal);
+    let spread = of_a_walk(stretches, terms, &values);
+    terms.iter().zip(values).zip(spread).any(|((term, v), d)| *term == Term::Lag && v.abs() <= BY_CHANCE * d)
+}
+
+/// c, where blocks that are left out are predicted far better with it: a filter of the gyroscope's own, of which a lag is the
+/// first order, shows on ramps of the rate.
+fn response(stretches: &[Stretch], folds: &Folds) -> Option<f64> {
+    let terms = [Term::Bias, Term::Scale, Term::Lag, Term::Response];
+    let left = |terms: &[Term]| left_out_in_turn(stretches, folds, terms).sqrt();
+    (left(&terms) < (1.0 - RESPONSE_FALL) * left(&terms[..3])).then(|| estimate(stretches, &terms, ErrorLaw::Normal)[3])
+}
+
 /// An identified rate gyroscope.
 #[derive(Debug, Clone)]
 pub(crate) struct RateGyroscope {
     pub(crate) sensor: Sensor,
     /// undoing the terms does not predict parts of the runs that were left out clearly worse than nothing does
     pub(crate) answered: bool,
-    /// terms with their values and standard deviations by the jackknife over parts
+    /// terms with their values and standard deviations of the larger of two answers
     pub(crate) terms: Vec<(Term, f64, f64)>,
     /// what would be a lag, s, where all of it shows in one part of the runs
     pub(crate) lag_of_one_place: Option<f64>,
+    /// c where most of what is left goes with the acceleration, s²: it is said and not undone
+    pub(crate) response: Option<f64>,
     /// the bias does not repeat from run to run: it is taken to be zero elsewhere
     pub(crate) bias_varies: bool,
     /// geometric mean of the left-out rms, rad, with the terms and without
@@ -136,13 +159,20 @@ impl RateGyroscope {
     /// Identifies bias, scale factor and lag; `None` where a run has no angle or all of them too few rows.
     pub(crate) fn identify(stated_gain: Option<f64>, period: f64, runs: &[SensorRun]) -> Option<Self> {
         let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs).ok()?;
-        let all: Vec<Stretch> =
-            runs.iter().enumerate().map(|(i, r)| Stretch::new(r, i, &sensor)).collect::<Option<_>>()?;
-        let splits = splits(&all);
-        if splits.len() < 2 {
+        let as_recorded = stretches(runs, &sensor, 0.0)?;
+        let parts = splits(&as_recorded);
+        if parts.len() < 2 {
             return None;
         }
-        let terms = told(&all, &Folds::interleaved(runs));
+        let folds = Folds::interleaved(runs);
+        let mut terms = told(&as_recorded, &folds);
+        let (_, shows_lag) = estimates(&as_recorded, &parts, &terms, ErrorLaw::Normal);
+        if shows_lag && lag_by_chance(&as_recorded, &terms) {
+            terms.retain(|term| *term != Term::Lag);
+        }
+        let shows_lag = shows_lag && terms.contains(&Term::Lag);
+        let all = if shows_lag { as_late_as_it_is(as_recorded, runs, &sensor) } else { as_recorded };
+        let splits = splits(&all);
         let law = ErrorLaw::likelier(&all, &terms);
         let (fits, tells_lag) = estimates(&all, &splits, &terms, law);
         let log_variance = |left: Vec<f64>| variance(&left).ln();
@@ -154,24 +184,34 @@ impl RateGyroscope {
         let scatter = gained.iter().map(|g| (g - mean(&gained)).powi(2)).sum::<f64>() / (n - 1.0);
         let answered = mean(&gained) < HARMS * (scatter / n).sqrt();
         let mut values = estimate(&all, &terms, law);
+        let spread = deviations(&all, &terms, &values, &fits);
         let bias_varies = forget_a_bias_that_varies(&all, &terms, law, &mut values);
-        let deviations = jackknife(&fits, terms.len());
         let every = [Term::Bias, Term::Scale, Term::Lag];
         let (every_fit, _) = estimates(&all, &splits, &every, law);
         let tells_scale = terms.iter().position(|t| *t == Term::Scale);
         let scale = tells_scale.filter(|_| answered).map_or(0.0, |i| values[i]);
-        let found = terms.iter().zip(values).zip(deviations).map(|((t, v), d)| (*t, v, d));
+        let found = terms.iter().zip(values).zip(spread).map(|((t, v), d)| (*t, v, d));
+        let response = tells_lag.then(|| response(&all, &folds)).flatten();
         let (lags, terms): (Vec<_>, Vec<_>) = found.partition(|t| t.0 == Term::Lag && !tells_lag);
         Some(Self {
             sensor,
             answered,
             terms,
+            response: response.filter(|_| lags.is_empty()),
             lag_of_one_place: lags.first().map(|t| -t.1 / (sensor.gain + scale)),
             bias_varies,
             predicted: (0.5 * mean(&loss)).exp(),
             predicted_raw: (0.5 * mean(&raw)).exp(),
-            gain: (sensor.gain + scale, tells_scale.map(|_| jackknife(&every_fit, 3)[1])),
+            gain: (
+                sensor.gain + scale,
+                tells_scale.map(|_| deviations(&all, &every, &estimate(&all, &every, law), &every_fit)[1]),
+            ),
         })
+    }
+
+    /// By how much the angle is late, s; 0 where that is not told.
+    pub(crate) fn latency_s(&self) -> f64 {
+        -self.value(Term::Lag) / self.gain.0
     }
 
     /// Value of a term; 0 where it was not chosen or nothing helps.
@@ -180,12 +220,54 @@ impl RateGyroscope {
         chosen.map_or(0.0, |t| t.1)
     }
 
+    /// Time constant of the low-pass of first order that responds alike, s; negative where the response overshoots.
+    pub(crate) fn time_constant_s(&self) -> Option<f64> {
+        let spread = 2.0 * self.response? / self.gain.0;
+        Some(spread.abs().sqrt().copysign(spread))
+    }
+
+    /// Error of a run with the terms taken out, and what else has a name: the response, and a lag of one place.
+    pub(crate) fn without_a_name(&self, run: &SensorRun) -> Vec<f64> {
+        let late = ago(&run.t_s, &run.acceleration_rad_s2, self.latency_s());
+        let response = self.response.unwrap_or(0.0);
+        let lag_s = self.lag_of_one_place.unwrap_or(0.0);
+        let behind = mean_rates(run, lag_s).into_iter().map(|rate| -lag_s * self.gain.0 * rate);
+        let named = late.into_iter().map(|a| response * a).zip(behind).map(|(a, b)| a + b);
+        self.left(run).into_iter().zip(named).map(|(left, named)| left - named).collect()
+    }
+
     /// Error of a run with the terms taken out.
     pub(crate) fn left(&self, run: &SensorRun) -> Vec<f64> {
-        let Some(stretch) = Stretch::new(run, 0, &self.sensor) else { return Vec::new() };
+        let Some(stretch) = Stretch::new(run, 0, &self.sensor, self.latency_s()) else { return Vec::new() };
         let every = [Term::Bias, Term::Scale, Term::Lag];
         stretch.left(&every, &every.map(|t| self.value(t)))
     }
+}
+
+fn stretches(runs: &[SensorRun], sensor: &Sensor, lag_s: f64) -> Option<Vec<Stretch>> {
+    runs.iter().enumerate().map(|(number, run)| Stretch::new(run, number, sensor, lag_s)).collect()
+}
+
+/// The same stretches with the mean rate over the lag in the place of each rate, for as long as that leaves less: the rate of
+/// the moment would leave l²Ω̇/2 on ramps.
+fn as_late_as_it_is(first: Vec<Stretch>, runs: &[SensorRun], sensor: &Sensor) -> Vec<Stretch> {
+    let terms = [Term::Bias, Term::Scale, Term::Lag];
+    let fitted = |all: &[Stretch]| {
+        let values = estimate(all, &terms, ErrorLaw::Normal);
+        let left: f64 = all.iter().map(|s| s.error.len() as f64 * variance(&s.left(&terms, &values))).sum();
+        (-values[2] / (sensor.gain + values[1]), left)
+    };
+    let (mut lag_s, mut least) = fitted(&first);
+    let mut best = first;
+    for _ in 0..MOST_ROUNDS {
+        let Some(all) = stretches(runs, sensor, lag_s) else { break };
+        let (next, left) = fitted(&all);
+        if left >= least {
+            break;
+        }
+        (best, lag_s, least) = (all, next, left);
+    }
+    best
 }
 
 fn fastest(all: &[Stretch]) -> f64 {
@@ -218,21 +300,10 @@ fn forget_a_bias_that_varies(all: &[Stretch], terms: &[Term], law: ErrorLaw, val
     true
 }
 
-/// Standard deviations of estimates each made without one part (Künsch 1989).
-pub(super) fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
-    let n = fits.len() as f64;
-    (0..unknowns)
-        .map(|i| {
-            let mean = fits.iter().map(|f| f[i]).sum::<f64>() / n;
-            ((n - 1.0) / n * fits.iter().map(|f| (f[i] - mean).powi(2)).sum::<f64>()).sqrt()
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::samples::Reading;
     use super::*;
-    use crate::angle_sensor::samples::Reading;
     use crate::recording::Role;
 
     /// Turned there and back at a constant rate: 2 % of scale factor and a bias.

@@ -1,8 +1,10 @@
-//! The regression of a rate gyroscope's angle on bias, scale factor and lag, under the law that its errors follow.
+//! The regression of a rate gyroscope's angle error: its terms, the stretches of runs that it is made on, and the law that its
+//! errors follow.
 
 use super::samples::{Reading, SensorRun};
 use super::selection::VARYING_RATE;
 use super::sensor::{Sensor, centred};
+use crate::numerics::interpolation;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{median, robust_deviation};
 
@@ -17,6 +19,8 @@ pub(crate) enum Term {
     Scale,
     /// l, s
     Lag,
+    /// c, s², of the acceleration a lag ago: what a response is besides late
+    Response,
 }
 
 /// How the errors of the angle are distributed.
@@ -36,14 +40,18 @@ const SMALLEST_DEVIATION: f64 = 1e-2;
 #[derive(Debug, Clone)]
 pub(super) struct Stretch {
     pub(super) run: usize,
-    t: Vec<f64>,
+    pub(super) t: Vec<f64>,
     reference: Vec<f64>,
+    /// mean rate since a lag ago
     pub(super) rate: Vec<f64>,
+    /// acceleration of the reference a lag ago, rad/s²
+    acceleration: Vec<f64>,
     pub(super) error: Vec<f64>,
 }
 
 impl Stretch {
-    pub(super) fn new(run: &SensorRun, number: usize, sensor: &Sensor) -> Option<Self> {
+    /// What is regressed on, of a gyroscope about as late as this, s.
+    pub(super) fn new(run: &SensorRun, number: usize, sensor: &Sensor, lag_s: f64) -> Option<Self> {
         let Reading::Angle(theta) = &run.reading else { return None };
         let raw: Vec<f64> = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - sensor.gain * a).collect();
         let error = centred(&raw, sensor.period);
@@ -51,9 +59,17 @@ impl Stretch {
             run: number,
             t: run.t_s.clone(),
             reference: run.reference_rad.clone(),
-            rate: run.rate_rad_s.clone(),
+            rate: mean_rates(run, lag_s),
+            acceleration: ago(&run.t_s, &run.acceleration_rad_s2, lag_s),
             error,
         })
+    }
+
+    /// One with this error, whose rate and acceleration are nothing.
+    #[cfg(test)]
+    pub(super) fn of(t: Vec<f64>, reference: Vec<f64>, error: Vec<f64>) -> Self {
+        let none = vec![0.0; t.len()];
+        Self { run: 0, t, reference, rate: none.clone(), acceleration: none, error }
     }
 
     pub(super) fn part(&self, rows: std::ops::Range<usize>) -> Self {
@@ -62,6 +78,7 @@ impl Stretch {
             t: self.t[rows.clone()].to_vec(),
             reference: self.reference[rows.clone()].to_vec(),
             rate: self.rate[rows.clone()].to_vec(),
+            acceleration: self.acceleration[rows.clone()].to_vec(),
             error: self.error[rows].to_vec(),
         }
     }
@@ -72,6 +89,7 @@ impl Stretch {
             Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
             Term::Scale => self.reference[i],
             Term::Lag => self.rate[i],
+            Term::Response => self.acceleration[i],
         }
     }
 
@@ -91,6 +109,17 @@ impl Stretch {
             .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
             .collect()
     }
+}
+
+/// Mean rate of a run's reference over so long before each row, rad/s.
+pub(super) fn mean_rates(run: &SensorRun, since_s: f64) -> Vec<f64> {
+    let (angle, rate) = (|i: usize| run.reference_rad[i], |i: usize| run.rate_rad_s[i]);
+    (0..run.len()).map(|i| interpolation::mean_rate_before(&run.t_s, angle, rate, i, since_s)).collect()
+}
+
+/// What `values` at `t_s` were so long ago, s.
+pub(super) fn ago(t_s: &[f64], values: &[f64], since_s: f64) -> Vec<f64> {
+    t_s.iter().map(|t| interpolation::at(t_s, t - since_s, |i| values[i])).collect()
 }
 
 pub(super) fn variance(values: &[f64]) -> f64 {
@@ -201,7 +230,7 @@ mod tests {
         };
         let sensor =
             Sensor::new(Some(1.0), std::f64::consts::TAU, std::slice::from_ref(&run)).expect("a gain is stated");
-        [Stretch::new(&run, 0, &sensor).expect("it reads an angle")]
+        [Stretch::new(&run, 0, &sensor, 0.0).expect("it reads an angle")]
     }
 
     #[test]

@@ -25,6 +25,8 @@ const STANDS_OUT: f64 = 10.0;
 const MOST_OF_IT: f64 = 0.5;
 const LONGEST_SHARE: f64 = 0.125;
 const LEAST: f64 = 1e-3;
+/// Rows before and behind one that its middle is taken with.
+const BESIDE: usize = 5;
 
 /// The runs that can be believed, of a gyroscope of this nominal scale factor and an angle of this period, rad; those that cannot are left out by name.
 ///
@@ -137,19 +139,33 @@ fn end_of_range(run: &SensorRun, period: f64) -> Option<String> {
     None
 }
 
+/// Says that a response is more than late, by the low-pass of first order that responds alike, s; negative where it overshoots.
+pub(super) fn of_the_response(time_constant_s: f64) -> String {
+    let corner_hz = 1.0 / (std::f64::consts::TAU * time_constant_s.abs());
+    let like = if time_constant_s > 0.0 { "is cut off as by" } else { "overshoots, by as much as is cut off by" };
+    format!(
+        "most of what is left goes with the acceleration of the reference: the output is not only late, it {like} a low-pass of first \
+         order at {corner_hz:.3} Hz; the lag is undone and that is not: it shows on ramps of the rate and nowhere else"
+    )
+}
+
 /// Says where in a run the angle and its reference part by most of what is `left`, where that is a short part of it; or that
 /// they do all along, by more than noise of the rate makes.
 pub(super) fn parting(run: &SensorRun, left: &[f64]) -> Option<String> {
     let (n, t_s) = (left.len(), &run.t_s);
     let steps: Vec<f64> = left.windows(2).map(|w| w[1] - w[0]).collect();
-    let all = span(left);
+    // what stays: rows in which the rate steps are off by themselves
+    let stays: Vec<f64> =
+        (0..n).map(|i| median(&mut left[i.saturating_sub(BESIDE)..(i + BESIDE + 1).min(n)].to_vec())).collect();
+    let all = span(&stays);
     let usual = robust_deviation(steps.iter().copied());
     if all < LEAST || usual <= 0.0 {
         return None;
     }
     let longest = LONGEST_SHARE * n as f64;
     let widths = std::iter::successors(Some(1usize), |w| Some(2 * w)).take_while(|w| *w as f64 <= longest);
-    let widest = |w: usize| (0..n - w).map(move |i| (i, w, left[i + w] - left[i]));
+    let stays = &stays;
+    let widest = |w: usize| (0..n - w).map(move |i| (i, w, stays[i + w] - stays[i]));
     let stands_out = |&(_, w, by): &(usize, usize, f64)| by.abs() / (usual * (w as f64).sqrt());
     let most = |p: &(usize, usize, f64)| p.2.abs() > MOST_OF_IT * all && stands_out(p) > STANDS_OUT;
     let found = widths.flat_map(widest).filter(most).max_by(|a, b| stands_out(a).total_cmp(&stands_out(b)));

@@ -16,7 +16,7 @@ use crate::facts::Follows;
 use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::numerics::statistics::median;
-use crate::recording::{Campaign, Instrument};
+use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
@@ -202,7 +202,7 @@ pub(crate) fn report(
         angular_gain: finding.angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
-        unexplained: described(&effects, finding.hypothesis.angular_gain.abs()),
+        unexplained: described(&effects, finding.hypothesis.angular_gain.abs(), of_a_table(&finding)),
         effects,
         heldout: errors.heldout(held),
         steps,
@@ -212,6 +212,7 @@ pub(crate) fn report(
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
         scale_factor: None,
+        misalignment: Vec::new(),
         allan: None,
         temperature,
         decay: None,
@@ -300,8 +301,17 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
     }
 }
 
+/// What could be done about a harmonic of the angle table.
+fn of_a_table(finding: &Finding<'_>) -> &'static str {
+    if finding.readout.is_some() {
+        "corrected as part of the angle table: what the two channels were found to have does not make it"
+    } else {
+        "corrected as part of the angle table; record the two channels, which tell offset, gain and skew from the rest"
+    }
+}
+
 /// What was corrected without a known cause, of a sensor with so many periods a turn.
-fn described(effects: &[EffectReport], periods: f64) -> Vec<Unexplained> {
+fn described(effects: &[EffectReport], periods: f64, of_a_table: &str) -> Vec<Unexplained> {
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
@@ -322,13 +332,7 @@ fn described(effects: &[EffectReport], periods: f64) -> Vec<Unexplained> {
                     let seen = |p: &crate::report::ParameterReport| p.ci95.is_some_and(|i| i[0] > 0.0 || i[1] < 0.0);
                     if seen(c) || seen(s) {
                         let n = c.name.trim_start_matches("cos_").parse().ok();
-                        add(
-                            "pattern-harmonic",
-                            n,
-                            c.value.hypot(s.value),
-                            "corrected as part of the angle table; record the two channels, which tell offset, gain and skew \
-                             from the rest",
-                        );
+                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table);
                     }
                 }
             }
@@ -386,7 +390,8 @@ fn runs(
         };
     }
     let used = |number: usize| fitted.iter().chain(held).any(|r| r.number == number);
-    for (_, r) in out.iter_mut().enumerate().filter(|(number, _)| !used(*number)) {
+    let turned = |r: &RunReport| r.kind == RunKind::Rotation.name();
+    for (_, r) in out.iter_mut().enumerate().filter(|(number, r)| turned(r) && !used(*number)) {
         (r.r#use, r.agrees) = ("left out".into(), Some(false));
     }
     let seen: Vec<Seen> =

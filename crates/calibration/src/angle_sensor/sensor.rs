@@ -7,7 +7,7 @@ use nalgebra::{SMatrix, SVector};
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
-use super::units::{UNITS, Unit, by_gain};
+use super::units::{COUNTS, UNITS, Unit, by_gain, or_smaller};
 use crate::error::Refusal;
 use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::linear::NormalEquations;
@@ -61,7 +61,7 @@ impl Sensor {
                     period.to_degrees()
                 ),
                 format!(
-                    "angular_gain or pole_pairs in campaign.toml, or rows less than {:.0}° apart",
+                    "a reference in degrees; angular_gain or pole_pairs in campaign.toml, or rows less than {:.0}° apart",
                     0.5 * period.to_degrees()
                 ),
             ));
@@ -129,6 +129,9 @@ impl Sensor {
                 other.abs()
             )));
         }
+        if let Some(other) = or_smaller(gain, runs) {
+            return Ok(Some(other));
+        }
         Ok(by_gain(gain, &RATES, false).filter(|_| rates_alone).map(|unit| {
             let unit = unit.said();
             format!("{gain:.0} periods a turn were taken from rate_dps alone; or {unit}: table_deg, or pole_pairs, would tell")
@@ -185,7 +188,7 @@ impl Sensor {
 pub(crate) fn other_unit(runs: &[SensorRun], period: f64) -> Option<String> {
     let turns = |run: &SensorRun| magnitude(std::slice::from_ref(run), period) * run.travel_rad() / period;
     let gain = magnitude(runs, period);
-    let units = [&UNITS[..], &RATES[..]].concat();
+    let units = [&UNITS[..], &RATES[..], &COUNTS[..]].concat();
     by_gain(gain, &units, false).filter(|_| runs.iter().any(|run| turns(run) > 1.0)).map(|unit| unit.said())
 }
 

@@ -11,16 +11,39 @@ use crate::recording::Run;
 /// A unit of an angle and what one is in degrees.
 pub(super) type Unit = (&'static str, f64);
 
+/// Converters whose counts are whole turns.
+pub(super) const COUNTS: [Unit; 15] = [
+    ("counts of 10 bits", 360.0 / 1_024.0),
+    ("counts of 11 bits", 360.0 / 2_048.0),
+    ("counts of 12 bits", 360.0 / 4_096.0),
+    ("counts of 13 bits", 360.0 / 8_192.0),
+    ("counts of 14 bits", 360.0 / 16_384.0),
+    ("counts of 15 bits", 360.0 / 32_768.0),
+    ("counts of 16 bits", 360.0 / 65_536.0),
+    ("counts of 17 bits", 360.0 / 131_072.0),
+    ("counts of 18 bits", 360.0 / 262_144.0),
+    ("counts of 19 bits", 360.0 / 524_288.0),
+    ("counts of 20 bits", 360.0 / 1_048_576.0),
+    ("counts of 21 bits", 360.0 / 2_097_152.0),
+    ("counts of 22 bits", 360.0 / 4_194_304.0),
+    ("counts of 23 bits", 360.0 / 8_388_608.0),
+    ("counts of 24 bits", 360.0 / 16_777_216.0),
+];
+
 /// Units that are taken for degrees.
-pub(super) const UNITS: [Unit; 7] = [
+pub(super) const UNITS: [Unit; 8] = [
     ("turns", 360.0),
     ("rad", 57.295_779_513),
     ("gon", 0.9),
     ("mrad", 0.057_295_779_513),
+    // after those with a smaller turn, which theirs fills as well
+    ("mils of 6400 a turn", 0.05625),
     ("arc minutes", 1.0 / 60.0),
     ("mdeg", 1e-3),
     ("arc seconds", 1.0 / 3600.0),
 ];
+/// Units of which a turn is a whole number of degrees.
+const SMALLER: [Unit; 3] = [("arc minutes", 1.0 / 60.0), ("mdeg", 1e-3), ("arc seconds", 1.0 / 3600.0)];
 /// A gain is one of a unit within this share, and of so many periods a turn at most: of more, any number is near a whole one.
 const SAME_UNIT: f64 = 1e-3;
 const MOST_PERIODS: f64 = 64.0;
@@ -52,11 +75,14 @@ impl Found {
     }
 }
 
-/// What takes a unit to degrees, as a mapping has it: seven digits, or a whole divisor.
+/// What takes a unit to degrees, as a mapping has it: seven digits, or a divisor, whole or six digits after the point.
 fn factor(degrees: f64) -> String {
     let parts = degrees.recip().round();
     if (degrees * parts - 1.0).abs() < 1e-9 {
         return format!("/{parts:.0}");
+    }
+    if COUNTS.iter().any(|unit| unit.1 == degrees) {
+        return format!("/{:.6}", degrees.recip());
     }
     let seven: f64 = format!("{degrees:.6e}").parse().unwrap_or(degrees);
     format!("*{seven}")
@@ -81,13 +107,22 @@ pub(super) fn by_gain(gain: f64, units: &[Unit], angle: bool) -> Option<Found> {
     of_reference.chain(of_angle).min_by(|a, b| a.periods.total_cmp(&b.periods))
 }
 
+/// The converter whose counts fill a turn, of values that are whole numbers.
+fn counts(values: &[f64]) -> Option<Unit> {
+    let whole = values.iter().all(|v| (v - v.round()).abs() < 1e-6 && *v > -0.5);
+    let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.round()));
+    let of = COUNTS.into_iter().find(|(_, degrees)| largest < TURN_DEG / degrees)?;
+    (whole && span(values) > FILLED * TURN_DEG / of.1).then_some(of)
+}
+
 /// The unit of which the values of an angle fill a turn over and over; none of one in degrees.
 fn by_turn(values: &[f64]) -> Option<Unit> {
     let size = span(values);
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let wraps = steps.iter().any(|s| *s > WRAPS * size) && median(&mut steps) < SMALL * size;
     let fills = |turn: f64| size <= turn && size > FILLED * turn;
-    (wraps && !fills(TURN_DEG)).then(|| UNITS.into_iter().find(|(_, degrees)| fills(TURN_DEG / degrees)))?
+    let named = || UNITS.into_iter().find(|(_, degrees)| fills(TURN_DEG / degrees));
+    (wraps && !fills(TURN_DEG)).then(|| counts(values).or_else(named))?
 }
 
 /// The unit of which a reference that hardly turns fills a turn over and over.
@@ -151,23 +186,32 @@ pub(super) fn of_the_angle(run: &SensorRun) -> Option<String> {
     let like = |unit: &str, by: String| {
         format!("theta_deg in deg: it looks as if in {unit} (theta_deg = \"…{by}\" in [columns], or by --map)")
     };
-    let (size, largest) = (span(&values), values.iter().fold(f64::MIN, |m: f64, v| m.max(*v)));
+    let size = span(&values);
     let fills = |turn: f64| size <= turn && size > FILLED * turn;
     let (slope, start) = line(&run.reference_rad, theta);
     let left = theta.iter().zip(&run.reference_rad).map(|(t, a)| t - slope * a - start);
     let follows = span(&left.collect::<Vec<_>>()) < SMALL * span(theta);
     let beside = by_gain(slope.abs(), &UNITS, true).filter(|found| follows && found.column == ANGLE);
     let unit = by_turn(&values).or(beside.map(|found| found.unit));
-    if let Some((unit, degrees)) = unit.or_else(|| fills(std::f64::consts::TAU).then_some(UNITS[1])) {
-        return Some(like(unit, factor(degrees)));
-    }
-    let bits = (largest + 1.0).log2().ceil();
-    let counts = values.iter().all(|v| (v - v.round()).abs() < 1e-6) && bits > 9.0 && fills(bits.exp2());
-    counts.then(|| like(&format!("counts of {bits:.0} bits"), format!("/{:.6}", bits.exp2() / 360.0)))
+    let unit = unit.or_else(|| fills(std::f64::consts::TAU).then_some(UNITS[1])).or_else(|| counts(&values));
+    unit.map(|(unit, degrees)| like(unit, factor(degrees)))
+}
+
+/// What a whole number of periods a turn looks like besides, of an angle that goes on beyond its turn instead of wrapping: one in
+/// a smaller unit.
+pub(super) fn or_smaller(gain: f64, runs: &[SensorRun]) -> Option<String> {
+    let followed =
+        |run: &SensorRun| matches!(&run.reading, Reading::Angle(theta) if span(theta) > 2.0 * TURN_DEG.to_radians());
+    let found = by_gain(gain, &SMALLER, true).filter(|found| found.column == ANGLE && runs.iter().all(followed))?;
+    Some(format!(
+        "{gain:.0} periods a turn, by an angle that never wraps; or {}: pole_pairs in campaign.toml states which",
+        found.said()
+    ))
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::expect_used, reason = "a test fails by panicking")]
     use super::*;
 
     fn said(gain: f64, angle: bool) -> Option<(&'static str, &'static str, f64)> {
@@ -199,6 +243,14 @@ mod tests {
         for (turn, unit) in [(1.0, "turns"), (std::f64::consts::TAU, "rad"), (400.0, "gon"), (21_600.0, "arc minutes")]
         {
             assert_eq!(by_turn(&wrapped(turn)).map(|u| u.0), Some(unit));
+        }
+        // a converter's, of which the last digit may be missing in a short recording
+        for (bits, unit) in [(12, "counts of 12 bits"), (20, "counts of 20 bits"), (17, "counts of 17 bits")] {
+            let turn = 2.0_f64.powi(bits);
+            let counted: Vec<f64> = wrapped(turn).iter().map(|v| v.floor()).collect();
+            let found = by_turn(&counted).expect("a unit");
+            assert_eq!(found.0, unit);
+            assert!(factor(found.1).starts_with('/'), "{}", factor(found.1));
         }
         // there and back, or one station after the other
         assert_eq!(by_turn(&(0..500).map(|i| 400.0 * (0.01 * f64::from(i)).sin().abs()).collect::<Vec<_>>()), None);

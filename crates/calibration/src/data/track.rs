@@ -14,6 +14,7 @@ use crate::data::table;
 use crate::error::Refusal;
 use crate::model::prediction::Commands;
 use crate::numerics::angles::unwrapped;
+use crate::numerics::interpolation;
 use crate::numerics::statistics::span;
 use crate::recording::{Role, Run};
 
@@ -345,6 +346,12 @@ impl Track {
     pub(crate) fn rate(&self, i: usize) -> f64 {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(self.t_s.len() - 1));
         (self.input_rad[b] - self.input_rad[a]) / (self.t_s[b] - self.t_s[a])
+    }
+
+    /// Mean input rate over so long before sample `i`, s, rad/s; that of the sample itself where the time is none.
+    pub(crate) fn mean_rate_before(&self, i: usize, since_s: f64) -> f64 {
+        let (angle, rate) = (|row: usize| self.input_rad[row], |row| self.rate(row));
+        interpolation::mean_rate_before(&self.t_s, angle, rate, i, since_s)
     }
 
     /// Ends segments before these samples and begins others there; what is too short to carry a bias goes.

@@ -101,7 +101,7 @@ pub(crate) fn temperature(seen: &[Seen], sense: f64) -> Option<Temperature> {
         }
         None => {
             out.reason = Some(
-                "gain and bias are not told apart: that takes five runs, at two rates or in both directions, at several \
+                "gain and bias cannot be separated: that takes five runs, at two rates or in both directions, at several \
                  temperatures each"
                     .into(),
             );

@@ -134,6 +134,7 @@ pub(crate) fn report(
         decomposition: Vec::new(),
         proposals: Vec::new(),
         scale_factor: None,
+        misalignment: Vec::new(),
         allan: None,
         temperature: None,
         decay: Some(decay(finding, fitted, &head)),
@@ -220,7 +221,7 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
     let mut out = Vec::new();
     if !finding.chosen.many_angles {
         out.push(format!(
-            "the pattern stands near one angle: what anisodamping adds to precession and to the decay cannot be told from \
+            "the pattern stands near one angle: what anisodamping adds to precession and to the decay cannot be separated from \
              them there, of the split only what lies at 45° to the pattern shows, and a scale of y that is 1 % larger than \
              that of x makes the precession {:+.2} % larger; decays at several starting angles would tell",
             (2.0 * finding.fit.model.axis_rad).cos()
@@ -238,7 +239,7 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
     if finding.fit.model.has(Term::Precession) {
         let known = fitted.iter().any(|r| r.rate_is_known);
         let why = if known { "the input rate is zero" } else { "the input rate is not stated" };
-        out.push(format!("{why}: the angular gain is not told, and `decay` has the precession rate itself"));
+        out.push(format!("{why}: the angular gain is not identifiable, and `decay` has the precession rate itself"));
         if let Some(stated) = head.stated_gain {
             out.push(format!("the stated angular gain of {stated} was not used"));
         }
@@ -275,7 +276,7 @@ fn unseen(finding: &Finding, runs: &[DecayRun]) -> Option<String> {
     let [along, across] = [Term::SplitAlong, Term::SplitAcross].map(|t| (model.value(t), at(t)));
     let split = along.0.hypot(across.0);
     Some(format!(
-        "all decays are at one rate, where a phase between the channels is hardly told from other mechanics: 1 mrad of it, \
+        "all decays are at one rate, where a phase between the channels is hardly separated from other mechanics: 1 mrad of it, \
          unseen, would make the precession {:+.2} % and the split {:+.2} % larger; the decays leave room for {:.3} mrad, \
          which the intervals hold, and decays at another rate would tell it",
         percent(model.value(turning), at(turning)),

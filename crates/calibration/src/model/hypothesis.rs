@@ -130,6 +130,11 @@ impl Hypothesis {
         at
     }
 
+    /// By how much the output is stamped late, s.
+    pub(crate) fn latency_s(&self) -> f64 {
+        self.member(EffectId::AngleLatency).map_or(0.0, |m| m.values[0])
+    }
+
     /// The first member that is `id`.
     pub fn member(&self, id: EffectId) -> Option<&Member> {
         self.members.iter().find(|m| m.id == id)

@@ -116,6 +116,7 @@ impl Found {
             decomposition: shares(&self.errors.declared_on_fit, &amplitudes),
             proposals,
             scale_factor: self.scale_factor,
+            misalignment: Vec::new(),
             allan: None,
             temperature,
             decay: None,

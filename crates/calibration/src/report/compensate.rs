@@ -66,7 +66,8 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     for segment in &track.segments {
         propagate(&track, segment, h, &none, Start::default(), Stepping::every(1), |row| {
             let i = row.index;
-            let at = track.moment(i, h.precession(track.rate(i)));
+            // a late output turned meanwhile at the mean rate since
+            let at = track.moment(i, h.precession(track.mean_rate_before(i, h.latency_s())));
             let seen = track.envelope(i);
             let (sin, cos) = (-row.drift).sin_cos();
             let z = h.unread(seen, &at).turned(sin, cos);

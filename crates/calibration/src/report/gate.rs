@@ -123,7 +123,7 @@ fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
     if !gain_is_told(&k) {
         return Err(Refusal::no_answer(
             &report.device,
-            format!("the angular gain is not told: {:.4} ± {:.1e}", k.value, k.half_width()),
+            format!("the angular gain is not identifiable: {:.4} ± {:.1e}", k.value, k.half_width()),
             "runs at other rates and in both directions, or faster ones",
         ));
     }

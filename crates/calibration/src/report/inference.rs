@@ -126,7 +126,7 @@ impl Inference<'_> {
             return gain;
         }
         warnings.push(format!(
-            "the angular gain, {:.5}, is told from drifts by one run that turns back, and no other bears it out: without a drift \
+            "the angular gain, {:.5}, is separated from drifts by one run that turns back, and no other bears it out: without a drift \
              the others give {}, and its interval covers them; a second run there and back would tell",
             gain.value,
             listed(&odd)
@@ -176,7 +176,7 @@ impl Inference<'_> {
     }
 
     /// The detection gain ratio with an interval that also covers what the runs would tell of it without anisodamping, where
-    /// the two are told apart by a run that no other bears out: ½(g − 1) sin 2θ of the readout beside Δ(1/τ)/(4kΩ) sin 2θ of
+    /// the two are separated by a run that no other bears out: ½(g − 1) sin 2θ of the readout beside Δ(1/τ)/(4kΩ) sin 2θ of
     /// the mechanics. Were that run of another instrument, the difference would be that of two ratios.
     fn borne_out(&self, ratio: Estimate, warnings: &mut Vec<String>) -> Estimate {
         let damping = self.hypothesis().member(EffectId::Anisodamping).map_or(0.0, |m| m.values[1]);
@@ -190,7 +190,7 @@ impl Inference<'_> {
             return ratio;
         }
         warnings.push(format!(
-            "the detection gain ratio, {:.5}, and anisodamping are told apart by a run that no other bears out: without \
+            "the detection gain ratio, {:.5}, and anisodamping are separated by a run that no other bears out: without \
              anisodamping the runs differ in the ratio, {}, and its interval covers them; a rotation run at yet another rate \
              would tell",
             ratio.value,

@@ -9,7 +9,11 @@ pub(crate) fn run_report(run: &Run) -> RunReport {
     RunReport {
         file: run.file.display().to_string(),
         kind: run.kind.name().into(),
-        r#use: if run.kind == RunKind::Static { "at rest".into() } else { "fit".into() },
+        r#use: match run.kind {
+            RunKind::Static => "at rest".into(),
+            RunKind::CrossAxis => "misalignment".into(),
+            _ => "fit".into(),
+        },
         rows: run.recording.reference_hz.map_or(run.recording.len(), |_| rows_read(d)),
         dropped: dropped(d),
         rate_dps: None,

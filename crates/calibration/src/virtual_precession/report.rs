@@ -44,7 +44,7 @@ pub(crate) fn report(
     let found = Finding { learned, correction, settings, detection_known: status.detection_known };
     if !(status.detection_known || learned.told(Parameter::ForceRatio)) {
         return Err(no_answer(
-            "the pattern hardly moved: nothing is told of readout or drives",
+            "the pattern hardly moved: readout and drives are not identifiable",
             "half a minute and more of virtual precession to and fro, and ten seconds of turning by hand",
         ));
     }
@@ -71,7 +71,7 @@ pub(crate) fn report(
     } else {
         out.status = Status::Neutral;
         out.reason = Some(format!(
-            "at rest only the product of detection and actuation shows: the two are not told apart, and nothing is undone \
+            "at rest only the product of detection and actuation shows: the two cannot be separated, and nothing is undone \
              ({:.2}° of bias may be left)",
             status.bias_rad.to_degrees()
         ));

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use serde_json::{Map, Value, json};
 
 use crate::population::{Change, Device, Line, Oddity, Population};
-use crate::report::{fleet as page, significant};
+use crate::report::fleet as page;
+use crate::report::numbers::significant;
 
 /// fleet.json
 pub(super) fn facts(population: &Population, devices: &[Device]) -> Value {

@@ -7,7 +7,7 @@ use cvg_model::effects::EffectId;
 use serde_json::{Value, json};
 
 use super::circle;
-use super::finding::LEAST_DEG;
+use super::numbers::LEAST_DEG;
 use super::tables::name_of_angle;
 use crate::clouds::thinned;
 

@@ -1,82 +1,17 @@
-//! The finding in one sentence, and numbers as a person says them.
+//! The finding in one sentence.
 
 use cvg_calibration::Origin;
 use cvg_calibration::report::{EffectReport, Heldout, Report, Status};
 use cvg_model::effects::EffectId;
 
-use crate::report::significant;
+use super::numbers::{LEAST_DEG, Shown, degrees};
 
 /// A residual within this factor of the noise is the noise.
 const AT_THE_NOISE: f64 = 1.2;
-/// An angle error below this is none, deg: no recording of an angle has as many digits, and no figure shows less.
-pub(super) const LEAST_DEG: f64 = 1e-6;
 /// What is unexplained and yet taken out begins its suggestion so.
 const CORRECTED: &str = "corrected as";
 /// Effects that a sentence can name.
 const NAMED: usize = 3;
-
-/// An angle with three significant digits, in the unit of its size.
-pub(super) fn degrees(value: f64) -> String {
-    if !value.is_finite() {
-        return "—".into();
-    }
-    let size = value.abs();
-    if size < 0.5 * LEAST_DEG {
-        return "below 0.000001°".into();
-    }
-    let digits = if size >= 10.0 {
-        1
-    } else if size >= 1.0 {
-        2
-    } else if size >= 0.1 {
-        3
-    } else if size >= 0.01 {
-        4
-    } else if size >= 0.001 {
-        5
-    } else {
-        6
-    };
-    format!("{value:.digits$}°")
-}
-
-/// Digits after the point that a value has when its deviation `half_width` keeps two digits; none for what needs an
-/// exponent.
-fn decimals(value: f64, half_width: f64) -> Option<usize> {
-    let sound = value.is_finite() && half_width.is_finite() && half_width > 0.0 && value.abs() >= 1e-3;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "of the order of ten")]
-    sound.then(|| (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize)
-}
-
-/// A value as sharp as it is known, with the half width of its interval.
-pub(super) fn measured(value: f64, ci95: Option<[f64; 2]>) -> String {
-    let half_width = ci95.map(|c| 0.5 * (c[1] - c[0]));
-    match half_width.and_then(|h| Some((h, decimals(value, h)?))) {
-        Some((h, digits)) => format!("{value:.digits$} ± {h:.digits$}"),
-        None => significant(value),
-    }
-}
-
-/// A value and the ends of its interval, as sharp as they are known.
-pub(super) fn interval(value: f64, ci95: [f64; 2]) -> [String; 3] {
-    let all = [value, ci95[0], ci95[1]];
-    match decimals(value, 0.5 * (ci95[1] - ci95[0])) {
-        Some(digits) => all.map(|v| format!("{v:.digits$}")),
-        None => all.map(significant),
-    }
-}
-
-/// By how much an error became less.
-pub(super) fn times(before: f64, after: f64) -> String {
-    let factor = before / after;
-    if !factor.is_finite() {
-        "no factor".into()
-    } else if factor >= 10.0 {
-        format!("{factor:.0} times less")
-    } else {
-        format!("{factor:.1} times less")
-    }
-}
 
 /// What stands in the place of before and after where nothing is undone; none where something is.
 pub(super) fn of_nothing(status: Status, heldout: &Heldout) -> Option<String> {
@@ -156,8 +91,7 @@ pub(super) fn finding(r: &Report) -> String {
 fn name(e: &EffectReport) -> String {
     let title = EffectId::from_id(&e.id).map_or(e.id.as_str(), |id| id.description().title);
     let value = e.parameters.first().filter(|p| p.ci95.is_some());
-    let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
-    let value = value.map(|p| format!("{} = {}{}", p.name, measured(p.value, p.ci95), unit(&p.unit)));
+    let value = value.map(|p| Shown::of(e, p).in_words());
     value.map_or(title.to_owned(), |v| format!("{title} ({v})"))
 }
 
@@ -181,31 +115,6 @@ mod tests {
     use cvg_calibration::ErrorSize;
 
     use super::*;
-
-    #[test]
-    fn angles_keep_three_significant_digits() {
-        assert_eq!(degrees(29.63), "29.6°");
-        assert_eq!(degrees(0.26789), "0.268°");
-        assert_eq!(degrees(0.0011), "0.00110°");
-        assert_eq!([degrees(f64::NAN), degrees(0.0), degrees(1e-6)], ["—", "below 0.000001°", "0.000001°"]);
-    }
-
-    #[test]
-    fn a_value_is_as_sharp_as_it_is_known() {
-        assert_eq!(measured(1.0131963, Some([1.0131924, 1.0132002])), "1.0131963 ± 0.0000039");
-        assert_eq!(measured(27.01908, Some([26.982494, 27.055666])), "27.019 ± 0.037");
-        assert_eq!(measured(180.0, Some([100.0, 260.0])), "180 ± 80");
-        assert_eq!(measured(3.0, None), "3");
-        assert_eq!(interval(27.01908, [26.982494, 27.055666]), ["27.019", "26.982", "27.056"]);
-        assert_eq!(interval(2.5e-6, [2.4e-6, 2.6e-6])[0], "2.50000e-6");
-    }
-
-    #[test]
-    fn factors_are_as_sharp_as_they_are_known() {
-        assert_eq!(times(0.27, 0.0011), "245 times less");
-        assert_eq!(times(0.3, 0.1), "3.0 times less");
-        assert_eq!(times(0.3, 0.0), "no factor");
-    }
 
     #[test]
     fn where_nothing_is_undone_the_headline_has_no_before_and_after() {

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::figures::{Figure, shorts};
+use super::numbers::significant;
 use super::tables::{row, table};
-use super::{begin, draw, escape, finish, significant};
+use super::{begin, draw, escape, finish};
 use crate::Failure;
 use crate::population::{Change, Device, Line, Oddity, Population};
 
@@ -96,7 +97,7 @@ fn effects(h: &mut String, population: &Population) {
             let means = match (s.is_shared, s.is_rare) {
                 (true, _) => "shared: of the design or the board",
                 (_, true) => "an exception",
-                _ => "some have it: a batch, or hardly told",
+                _ => "some have it: a batch, or hardly identifiable",
             };
             let percent = |v: f64| format!("{:.1} %", 100.0 * v);
             let ends = format!("{} … {}", percent(s.ci95[0]), percent(s.ci95[1]));

@@ -1,17 +1,19 @@
-//! Numbers that only some campaigns tell: how the scale factor goes with the rate, how far an angle at rest wanders, how a
+//! Numbers that only some campaigns identify: how the scale factor goes with the rate, how far an angle at rest wanders, how a
 //! vibration decays.
+
+use std::borrow::Cow;
 
 use cvg_calibration::report::{Estimate, Report};
 
 /// A number with its unit.
-pub(crate) struct Number {
-    pub(crate) name: &'static str,
+pub(crate) struct Number<'a> {
+    pub(crate) name: Cow<'a, str>,
     pub(crate) value: Estimate,
     pub(crate) unit: &'static str,
 }
 
 /// Those of a report, in the order in which they are read.
-pub(crate) fn further(r: &Report) -> Vec<Number> {
+pub(crate) fn further(r: &Report) -> Vec<Number<'_>> {
     let scale = r.scale_factor.iter().flat_map(|s| {
         [("scale factor, nonlinearity", s.nonlinearity_ppm, "ppm"), ("scale factor, asymmetry", s.asymmetry_ppm, "ppm")]
     });
@@ -23,5 +25,10 @@ pub(crate) fn further(r: &Report) -> Vec<Number> {
         let bend = d.frequency_per_energy.map(|e| ("frequency over energy dω/dE", e, "rad/s/V²"));
         [("decay time constant τ", d.tau_s, "s"), ("precession", d.precession_dph, "deg/h")].into_iter().chain(bend)
     });
-    scale.chain(rest).chain(decay).map(|(name, value, unit)| Number { name, value, unit }).collect()
+    let across = r.misalignment.iter().filter_map(|m| {
+        let name = Cow::Owned(format!("misalignment, {}", m.file));
+        Some(Number { name, value: m.angle_deg?, unit: "deg" })
+    });
+    let named = scale.chain(rest).chain(decay).map(|(name, value, unit)| Number { name: name.into(), value, unit });
+    named.chain(across).collect()
 }

@@ -8,6 +8,8 @@ mod figures;
 mod finding;
 pub(crate) mod fleet;
 pub(crate) mod further;
+pub(crate) mod numbers;
+pub(crate) mod summary;
 pub(crate) mod survey;
 mod tables;
 
@@ -17,7 +19,8 @@ use cvg_calibration::Identification;
 use serde_json::Value;
 
 use self::figures::Figure;
-use self::finding::{finding, of_the_device, times};
+use self::finding::{finding, of_the_device};
+use self::numbers::{degrees, times};
 pub(crate) use self::tables::name_of_angle;
 use crate::{Failure, clouds, output};
 
@@ -33,18 +36,6 @@ const STILL_POINTS: usize = 600;
 /// report.json
 pub(crate) fn json(identified: &Identification) -> Result<String, Failure> {
     serde_json::to_string_pretty(&identified.report).map_err(Failure::input)
-}
-
-/// A value with some six significant digits.
-pub(crate) fn significant(value: f64) -> String {
-    let size = value.abs();
-    if value == value.trunc() && size < 1e6 {
-        format!("{value}")
-    } else if (1e-2..1e4).contains(&size) {
-        format!("{value:.6}")
-    } else {
-        format!("{value:.5e}")
-    }
 }
 
 /// The report of an identification.
@@ -113,8 +104,8 @@ fn headline(h: &mut String, identified: &Identification) {
     let said = finding::of_nothing(identified.report.status, held).unwrap_or_else(|| {
         format!(
             "{} <span class=\"arrow\">→</span> {} rms angle error, {}",
-            finding::degrees(before.rms_deg),
-            finding::degrees(held.discovered.rms_deg),
+            degrees(before.rms_deg),
+            degrees(held.discovered.rms_deg),
             times(of_the_device(&identified.report), held.discovered.rms_deg)
         )
     });
@@ -137,7 +128,7 @@ fn stages(h: &mut String, identified: &Identification) {
     let held = &identified.report.heldout;
     h.push_str("<div class=\"stages\">");
     let mut card = |class: &str, value: Option<f64>, what: &str| {
-        let value = value.map_or("the raw angle does not turn".to_owned(), finding::degrees);
+        let value = value.map_or("the raw angle does not turn".to_owned(), degrees);
         let _ = write!(h, "<div class=\"stage {class}\"><b>{value}</b><span>{what}</span></div>");
     };
     card("raw", held.raw.map(|e| e.rms_deg), "raw, as recorded");

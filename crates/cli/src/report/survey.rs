@@ -9,11 +9,10 @@ use serde_json::json;
 
 use super::circle;
 use super::figures::{self, Figure, axis, shorts};
-use super::finding::{degrees, interval, times};
+use super::numbers::{Shown, degrees, estimated, interval, measured, significant, times};
 use super::tables::{parameter, row, runs, table, temperature};
 use super::{begin, draw, escape, finish, warnings};
 use crate::Failure;
-use crate::report::significant;
 
 /// The page.
 pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
@@ -115,7 +114,7 @@ fn effects(h: &mut String, r: &Survey) {
 /// What the filter left unpredicted, and what nothing told.
 fn without_a_table(h: &mut String, r: &Survey) {
     let Some(v) = &r.virtual_precession else { return };
-    h.push_str("<h2 id=\"not-told\">What is not told</h2>");
+    h.push_str("<h2 id=\"not-identifiable\">Not identifiable from this campaign</h2>");
     table(h, "and which run would tell it", &["what", "separated by"], |h| {
         for n in &v.not_told {
             row(h, &[&escape(&n.what), &escape(&n.separated_by)]);
@@ -135,7 +134,7 @@ fn headline_without_a_table(v: &VirtualPrecession) -> String {
     if v.detection_known {
         format!("Told without a table: the detection may still make {} of bias, rms", degrees(v.bias_deg))
     } else {
-        "Detection and actuation are not told apart".to_owned()
+        "Detection and actuation cannot be separated".to_owned()
     }
 }
 
@@ -178,7 +177,7 @@ fn deviation(allan: &Allan) -> Figure {
 
 /// The Allan deviation in a line or two of a summary.
 pub(crate) fn allan_in_words(allan: &Allan) -> Vec<String> {
-    let told = |e: &Estimate, unit: &str| format!("{} ± {:.1e} {unit}", significant(e.value), e.half_width());
+    let told = |e: &Estimate, unit: &str| format!("{} {unit}", estimated(e));
     let walk = allan.angle_random_walk_deg_sqrt_h.as_ref().map_or("none seen".to_owned(), |e| told(e, "deg/√h"));
     vec![
         format!("  angle random walk           {walk}"),
@@ -210,17 +209,15 @@ pub(crate) fn summary(r: &Survey) -> String {
         line(format!("  {}", headline_without_a_table(v)));
         line(format!("  {}", seconds_in_words(v)));
         for p in &v.parameters {
-            line(format!("  {:<26} {} {}", p.name, significant(p.value), if p.unit == "1" { "" } else { &p.unit }));
+            let unit = if p.unit == "1" { "" } else { &p.unit };
+            line(format!("  {:<26} {} {unit}", p.name, measured(p.value, p.ci95)).trim_end().to_owned());
         }
         for n in &v.not_told {
-            line(format!("  not told: {}; {} would", n.what, n.separated_by));
+            line(format!("  not identifiable: {}; it takes {}", n.what, n.separated_by));
         }
     }
     for e in &r.effects {
-        let parameters = e.parameters.iter().map(|p| {
-            let unit = if p.unit == "1" { "" } else { &p.unit };
-            format!("{} = {} {unit}", p.name, significant(p.value)).trim_end().to_owned()
-        });
+        let parameters = e.parameters.iter().map(|p| Shown::of(e, p).in_words());
         line(format!("  {:<26} {}", e.id, parameters.collect::<Vec<_>>().join(", ")));
     }
     r.allan.iter().flat_map(allan_in_words).for_each(&mut line);

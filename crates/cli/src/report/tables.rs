@@ -8,9 +8,8 @@ use cvg_model::effects::EffectId;
 
 use super::escape;
 use super::figures::run_name;
-use super::finding::{interval, measured};
 use super::further::{Number, further};
-use crate::report::significant;
+use super::numbers::{NOT_IDENTIFIABLE, Shown, estimated, interval, significant};
 use crate::standard;
 
 /// Correlations that a reader should know of.
@@ -124,7 +123,7 @@ fn parameters(h: &mut String, identified: &Identification) {
                 let [value, low, high] = interval(e.value, e.ci95);
                 row(h, &[name, &value, &format!("{low} … {high}"), "1"]);
             }
-            None => row(h, &[name, "not told by this campaign", "", "1"]),
+            None => row(h, &[name, NOT_IDENTIFIABLE, "", "1"]),
         };
         estimate("angular gain k (scale factor)", Some(&r.angular_gain).filter(|k| k.is_told()));
         if !rates_alone {
@@ -135,7 +134,7 @@ fn parameters(h: &mut String, identified: &Identification) {
         }
         for Number { name, value, unit } in further(r) {
             let [value, low, high] = interval(value.value, value.ci95);
-            row(h, &[name, &value, &format!("{low} … {high}"), unit]);
+            row(h, &[&escape(&name), &value, &format!("{low} … {high}"), unit]);
         }
         let once = |name: &str| match name {
             "detection_gain_ratio" => r.detection_gain_ratio.is_none(),
@@ -145,8 +144,8 @@ fn parameters(h: &mut String, identified: &Identification) {
         for e in &r.effects {
             match harmonics_of_a_table(e) {
                 Some((order, largest)) => {
-                    let size = format!("largest {} at {}", significant(largest.1), largest.0);
-                    row(h, &[ANGLE_TABLE, &format!("{order} harmonics"), &size, "rad"]);
+                    let size = format!("largest {} at {}", significant(largest.1.to_degrees()), largest.0);
+                    row(h, &[ANGLE_TABLE, &format!("{order} harmonics"), &size, "deg"]);
                 }
                 None => e.parameters.iter().filter(|p| once(&p.name)).for_each(|p| parameter(h, e, p, SEARCHED)),
             }
@@ -174,18 +173,20 @@ fn harmonics_of_a_table(e: &EffectReport) -> Option<(usize, (usize, f64))> {
     Some((e.parameters.len() / 2, largest))
 }
 
-/// A parameter of an effect; `without` stands where it has no interval. A skew is told as an angle besides.
+/// A parameter of an effect; `without` stands where it has no interval. A skew is said as an angle besides.
 pub(super) fn parameter(h: &mut String, e: &EffectReport, p: &ParameterReport, without: &str) {
-    let mut told = |name: &str, of: fn(f64) -> f64, unit: &str| {
-        let (value, ends) = match p.ci95.map(|c| interval(of(p.value), c.map(of))) {
+    let mut said = |shown: &Shown<'_>| {
+        let (value, ends) = match shown.ci95.map(|c| interval(shown.value, c)) {
             Some([value, low, high]) => (value, format!("{low} … {high}")),
-            None => (significant(of(p.value)), without.to_owned()),
+            None => (significant(shown.value), without.to_owned()),
         };
-        row(h, &[&format!("{}: {}", escape(&e.id), escape(name)), &value, &ends, &escape(unit)]);
+        row(h, &[&format!("{}: {}", escape(&e.id), escape(shown.name)), &value, &ends, &escape(shown.unit)]);
     };
-    told(&p.name, |v| v, &p.unit);
+    said(&Shown::of(e, p));
     if e.id == EffectId::DetectionSkew.description().id {
-        told("axes off a right angle by", |v| v.atan().to_degrees(), "deg");
+        let angle = |v: f64| v.atan().to_degrees();
+        let (value, ci95) = (angle(p.value), p.ci95.map(|c| c.map(angle)));
+        said(&Shown { name: "axes off a right angle by", value, ci95, unit: "deg" });
     }
 }
 
@@ -342,7 +343,7 @@ fn files(h: &mut String, r: &Report) {
 /// What each run tells by itself.
 pub(super) fn runs(h: &mut String, runs: &[RunReport]) {
     h.push_str("<h2 id=\"runs\">Runs</h2>");
-    let told = |e: Option<Estimate>| e.map_or("—".to_owned(), |e| measured(e.value, Some(e.ci95)));
+    let told = |e: Option<Estimate>| e.map_or("—".to_owned(), |e| estimated(&e));
     let number = |v: Option<f64>, digits: usize| v.map_or("—".to_owned(), |v| format!("{v:.digits$}"));
     let columns = [
         "run",
@@ -392,7 +393,7 @@ pub(super) fn temperature(h: &mut String, told: Option<&Temperature>) {
         "<h2 id=\"temperature\">Temperature</h2><p>{} runs from {low:.1} to {high:.1} °C; straight lines, with 95 % intervals from \
          how the runs scatter about them.{}</p>",
         t.runs,
-        t.reason.as_ref().map_or(String::new(), |r| format!(" Not told: {}.", escape(r)))
+        t.reason.as_ref().map_or(String::new(), |r| format!(" Not identifiable: {}.", escape(r)))
     );
     let rows = [
         ("angular gain k", t.angular_gain_per_k, "1/K"),

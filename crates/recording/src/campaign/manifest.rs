@@ -62,6 +62,7 @@ pub(super) struct Manifest {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Rotation,
+    CrossAxis,
     Ringdown,
     Static,
     Decay,
@@ -107,6 +108,7 @@ const CAMPAIGN_KEYS: &[&str] = &[
     "control_hz",
 ];
 const ROTATION_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude", "rate_dps"];
+const CROSS_AXIS_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "rate_dps"];
 const STATIC_KEYS: &[&str] = &["kind", "file", "raw", "settle_s"];
 const DECAY_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude", "rate_dps"];
 const VIRTUAL_KEYS: &[&str] = &["kind", "file", "raw", "settle_s", "use", "amplitude"];
@@ -266,13 +268,14 @@ impl Text<'_> {
     fn run(&self, table: &DeTable<'_>, span: Range<usize>, instrument: Instrument) -> Result<Entry, ReadError> {
         let kinds = [
             ("rotation", Kind::Rotation),
+            ("cross-axis", Kind::CrossAxis),
             ("ringdown", Kind::Ringdown),
             ("static", Kind::Static),
             ("decay", Kind::Decay),
             ("virtual", Kind::Virtual),
         ];
         let Some(kind) = self.choice(table, "kind", &kinds)? else {
-            let wanted = "`kind = \"rotation\"`, \"ringdown\", \"static\", \"decay\" or \"virtual\"";
+            let wanted = "`kind = \"rotation\"`, \"cross-axis\", \"ringdown\", \"static\", \"decay\" or \"virtual\"";
             return Err(self.refuse(span, "this run has no `kind`", wanted));
         };
         if matches!(kind, Kind::Ringdown | Kind::Decay | Kind::Virtual) && instrument == Instrument::Sensor {
@@ -280,6 +283,7 @@ impl Text<'_> {
         }
         let (keys, place) = match kind {
             Kind::Rotation => (ROTATION_KEYS, "in a rotation run"),
+            Kind::CrossAxis => (CROSS_AXIS_KEYS, "in a run across the input axis"),
             Kind::Ringdown => (RINGDOWN_KEYS, "in a ring-down"),
             Kind::Static => (STATIC_KEYS, "in a run at rest"),
             Kind::Decay => (DECAY_KEYS, "in a free decay"),
@@ -300,6 +304,7 @@ impl Text<'_> {
         };
         let kind = match kind {
             Kind::Rotation => RunKind::Rotation,
+            Kind::CrossAxis => RunKind::CrossAxis,
             Kind::Static => RunKind::Static,
             Kind::Decay => RunKind::Decay,
             Kind::Virtual => RunKind::Virtual,

@@ -59,6 +59,8 @@ pub enum RunKind {
         /// Time at which the energy loop is switched off, s, on the time axis of the recording; positive.
         energy_off_s: f64,
     },
+    /// A rate gyroscope was turned about an axis across its input axis.
+    CrossAxis,
     /// The instrument stood still.
     Static,
     /// The resonator rang freely, without any loop.
@@ -74,6 +76,7 @@ impl RunKind {
         match self {
             Self::Rotation => "rotation",
             Self::Ringdown { .. } => "ringdown",
+            Self::CrossAxis => "cross-axis",
             Self::Static => "static",
             Self::Decay => "decay",
             Self::Virtual => "virtual",
@@ -286,6 +289,7 @@ impl Campaign {
             warnings.extend(entry.constant_rate(&mut recording));
             match entry.kind {
                 RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,
+                RunKind::CrossAxis => recording.require_rotation()?,
                 RunKind::Ringdown { .. } | RunKind::Virtual if instrument == Instrument::Sensor => {
                     return Err(manifest::ringdown_of_a_sensor(path, entry.at));
                 }

@@ -178,10 +178,12 @@ fn names_an_angle(text: &[u8], separator: u8, naming: &Naming) -> bool {
     requirement::holds_an_angle(|channel| channels.contains(&channel))
 }
 
-/// Whether a comment names channels above a line that does not.
+/// Whether a comment names channels above a line that does not, or names of its own above numbers.
 fn is_header_of(comment: &[u8], line: &[u8], told: Option<u8>, naming: &Naming) -> bool {
     let channels = |text: &[u8]| candidates(told).map(|separator| known(text, separator, naming)).max().unwrap_or(0);
-    channels(comment) > 0 && channels(line) == 0
+    let both = [comment.to_vec(), line.to_vec()];
+    let names = || candidates(told).any(|separator| beneath::stands_above_numbers(&both, separator));
+    (channels(comment) > 0 && channels(line) == 0) || names()
 }
 
 fn candidates(told: Option<u8>) -> impl Iterator<Item = u8> {

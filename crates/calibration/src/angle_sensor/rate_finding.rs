@@ -1,0 +1,150 @@
+//! What was found of a rate gyroscope, in the form that all instruments share.
+
+use cvg_model::effects::EffectId;
+
+use super::identify::{take_apart, thinned};
+use super::rate_deviations::T_PARTS;
+use super::rate_gyroscope::RateGyroscope;
+use super::rate_regression::Term;
+use super::rate_runs;
+use super::report::{ByItself, Finding};
+use super::samples::SensorRun;
+use crate::error::Refusal;
+use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::recording::Instrument;
+use crate::report::{EffectReport, Estimate, ParameterReport};
+
+/// Identifies a rate gyroscope from the runs to fit, and says what has to be said of it.
+///
+/// # Errors
+/// Where the runs are too short, or turn at one rate.
+pub(super) fn rate_finding(
+    stated: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    held: &[SensorRun],
+) -> Result<Finding<'static>, Refusal> {
+    let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
+        Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
+    })?;
+    let (gain, deviation) = model.gain;
+    let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
+    let value = sign * gain.abs();
+    let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
+    let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
+    neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
+    let mut hypothesis =
+        Hypothesis { angular_gain: value, rate_bias_rad_s: model.value(Term::Bias), ..neutral_hypothesis.clone() };
+    let latency = model.latency_s();
+    if latency != 0.0 {
+        let values = [latency, 0.0, 0.0, 0.0];
+        hypothesis.members.push(Member {
+            id: EffectId::AngleLatency,
+            values,
+            origin: Origin::Discovered,
+            refined: true,
+        });
+    }
+    let thinned = thinned(runs);
+    let samples = model.sensor.samples(&thinned, None);
+    let warnings = said_of(&model, runs, held)?;
+    let sensor = model.sensor;
+    let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
+    Ok(Finding {
+        instrument: Instrument::Gyroscope,
+        stated_gain: Some(stated.unwrap_or(1.0)),
+        reason: (!model.answered).then(|| {
+            "bias, scale factor and lag predict parts of the runs that were left out worse than nothing does".into()
+        }),
+        angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
+        detection_gain_ratio: None,
+        effects: rate_effects(&model),
+        hypothesis,
+        neutral_hypothesis,
+        decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
+        warnings,
+        raw: Some(Box::new(raw)),
+        declared: Box::new(raw),
+        alone: model.answered.then(|| -> ByItself<'_> {
+            let model = model.clone();
+            Box::new(move |run| model.alone(run))
+        }),
+        discovered: Box::new(move |run| model.left(run)),
+        readout: None,
+        direction: Box::new(move |run| {
+            sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
+        }),
+        period,
+    })
+}
+
+/// What has to be said of a rate gyroscope beside its numbers.
+fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Result<Vec<String>, Refusal> {
+    let mut warnings = Vec::new();
+    if model.gain.1.is_none() {
+        // of what hardly turns the bias is one all the same
+        let what = "the runs turn at one rate, at which a scale factor cannot be separated from a bias";
+        let wanted = "a run at another rate, or there and back";
+        if runs.iter().any(|run| run.travel_rad() > std::f64::consts::TAU) {
+            return Err(Refusal::no_answer("campaign", what, wanted));
+        }
+        warnings.push(format!("{what}: what is wrong stands as a bias, and the angular gain's interval says nothing; {wanted} separates them"));
+    }
+    if let Some(lag) = model.lag_of_one_place {
+        warnings.push(format!(
+            "the angle and its reference part at one place only, where the rate changes, as a lag of {:.3} ms makes them: one place \
+             does not tell a lag from a slip, and it is left as it is; runs that turn back several times tell",
+            1e3 * lag
+        ));
+    }
+    if model.bias_varies {
+        warnings
+            .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
+    }
+    if let Some(time_constant_s) = model.time_constant_s() {
+        warnings.push(rate_runs::of_the_response(time_constant_s));
+    }
+    let unexplained = |run| rate_runs::parting(run, &model.without_a_name(run));
+    warnings.extend(runs.iter().chain(held).filter_map(unexplained));
+    Ok(warnings)
+}
+
+fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
+    if !model.answered {
+        return Vec::new();
+    }
+    let evidence = format!(
+        "left-out fifths of the runs scatter by {:.4}° with it and {:.4}° without (geometric mean); interval by jackknife and as of a random walk",
+        model.predicted.to_degrees(),
+        model.predicted_raw.to_degrees()
+    );
+    let gain = model.gain.0;
+    let effect = |id: EffectId, origin, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
+        id: id.description().id.into(),
+        origin,
+        parameters: vec![ParameterReport {
+            name: name.into(),
+            unit: unit.into(),
+            value,
+            ci95: Some([value - T_PARTS * deviation, value + T_PARTS * deviation]),
+        }],
+        heldout_rms_deg: None,
+        evidence: format!("{}; {evidence}", id.description().signature),
+        confounded_with: Vec::new(),
+        separated_by: None,
+    };
+    let terms = model.terms.iter().filter(|t| t.1 != 0.0);
+    terms
+        .filter_map(|&(term, value, deviation)| match term {
+            Term::Bias => {
+                Some(effect(EffectId::RateOffset, Origin::Discovered, "rate_offset", "rad/s", value, deviation))
+            }
+            Term::Lag => {
+                let (value, deviation) = (-value / gain, deviation / gain.abs());
+                Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
+            }
+            // the scale factor is k, and a run's own bias is no effect of the instrument
+            Term::Scale | Term::BiasOf(_) | Term::Response => None,
+        })
+        .collect()
+}
