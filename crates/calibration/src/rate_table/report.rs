@@ -122,10 +122,8 @@ impl Found {
             decay: None,
             warnings,
         };
-        if let Some(what) = left_over(&report.heldout) {
-            report.warnings.push(what);
-            self.allow_for_what_is_left(&mut report);
-        }
+        report.warnings.extend(left_over(&report.heldout));
+        self.allow_for_what_is_left(&mut report);
         let mut calibration = self.calibration(&report, head.amplitude_v);
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
@@ -138,16 +136,25 @@ impl Found {
         Ok(Identification { report, figures, calibration, steps, plots })
     }
 
-    /// Widens the intervals of the angular gain and of the detection gain ratio by what can be in them of what is left: an error
-    /// Δk·α leaves Δk/√12 of the way rms, and one of the ratio, ½Δg sin 2θ, leaves Δg/√8.
+    /// Widens the intervals of the angular gain and of the detection gain ratio by what can be in them of what is left of the
+    /// fitted data beyond noise: an error Δk·α leaves Δk/√12 of the way rms, and one of the ratio, ½Δg sin 2θ, leaves Δg/√8.
+    /// Nothing that is held out has a say.
     fn allow_for_what_is_left(&self, report: &mut Report) {
-        let left = report.heldout.discovered.rms_deg.to_radians();
+        let left = self.errors.on_fit.mean_square().sqrt();
+        let floors = left / self.errors.on_fit.noise_floor();
+        if !(floors.is_finite() && floors > LEFT_OVER) {
+            return;
+        }
         let ways = self.dataset.tracks.iter().map(|t| span(&t.track.input_rad));
         let farthest = ways.fold(0.0, f64::max);
         if farthest > 0.0 {
             report.angular_gain = report.angular_gain.widened(12f64.sqrt() * left / farthest);
         }
         report.detection_gain_ratio = report.detection_gain_ratio.map(|ratio| ratio.widened(8f64.sqrt() * left));
+        report.warnings.push(format!(
+            "what is left of the fitted data is {floors:.1} times the noise floor: the intervals of the angular gain and of the \
+             detection gain ratio allow for as much of it as can be in them"
+        ));
     }
 
     fn calibration(&self, report: &Report, amplitude_v: Option<[f64; 2]>) -> Calibration {
@@ -263,8 +270,7 @@ fn left_over(heldout: &Heldout) -> Option<String> {
     (floors.is_finite() && floors > LEFT_OVER).then(|| {
         format!(
             "what is left on held-out data is {floors:.1} times the noise floor: an effect that nothing here explains, a \
-             recording that changed on its way, or noise that wanders; what is left may be in every value as well, and the \
-             intervals of angular and detection gain allow for it"
+             recording that changed on its way, or noise that wanders; what is left may be in every value as well"
         )
     })
 }
