@@ -163,9 +163,13 @@ fn a_gyroscope_without_a_lag_is_answered_whatever_its_noise() {
 fn runs_at_one_rate_do_not_tell_the_scale_factor() {
     for biases in [&[0.35][..], &[0.35, 0.35]] {
         let runs = biases.iter().enumerate().map(|(i, bias)| turned_at("one.csv", &[60.0; 4], *bias, i as u64));
+        let report = turned(runs.collect()).unwrap().report;
+        let k = report.angular_gain;
+        assert!(k.ci95[0] < -1.9 && k.ci95[1] > -0.1, "{k:?}");
         // 0.35 deg/s and 2 % of 60 deg/s make one number, which is neither
-        let refusal = turned(runs.collect()).map(|i| i.report).unwrap_err();
-        assert!(refusal.to_string().contains("turn at one rate") && refusal.wanted.contains("back"), "{refusal}");
+        let bias = report.effects.iter().find(|e| e.id == "rate-offset").unwrap().parameters[0].ci95.unwrap();
+        assert!(bias[0].to_degrees() < 0.35 && 0.35 < bias[1].to_degrees(), "{bias:?}");
+        assert!(report.warnings.iter().any(|w| w.contains("turn at one rate")), "{:?}", report.warnings);
     }
 }
 
