@@ -268,14 +268,14 @@ impl Text<'_> {
     fn run(&self, table: &DeTable<'_>, span: Range<usize>, instrument: Instrument) -> Result<Entry, ReadError> {
         let kinds = [
             ("rotation", Kind::Rotation),
-            ("cross-axis", Kind::CrossAxis),
             ("ringdown", Kind::Ringdown),
             ("static", Kind::Static),
             ("decay", Kind::Decay),
             ("virtual", Kind::Virtual),
+            ("cross-axis", Kind::CrossAxis),
         ];
         let Some(kind) = self.choice(table, "kind", &kinds)? else {
-            let wanted = "`kind = \"rotation\"`, \"cross-axis\", \"ringdown\", \"static\", \"decay\" or \"virtual\"";
+            let wanted = "`kind = \"rotation\"`, \"ringdown\", \"static\", \"decay\", \"virtual\" or \"cross-axis\"";
             return Err(self.refuse(span, "this run has no `kind`", wanted));
         };
         if matches!(kind, Kind::Ringdown | Kind::Decay | Kind::Virtual) && instrument == Instrument::Sensor {
