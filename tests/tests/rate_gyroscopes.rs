@@ -155,7 +155,7 @@ fn a_gyroscope_without_a_lag_is_answered_whatever_its_noise() {
         by_chance += usize::from(report.effects.iter().any(|e| e.id == "angle-latency"));
     }
     println!("a lag by chance in {by_chance} of 30, neutral in {neutral}");
-    // a walk whose excursions look like Laplace's law moves the line: held-out rows at one rate may not gain
+    // one walk in twenty passes for a lag, and where held-out rows are left worse by it nothing is undone
     assert!(neutral <= 1, "{neutral} of 30");
     // one in twenty walks as a lag would make it
     assert!(by_chance <= 3, "{by_chance} of 30");

@@ -100,7 +100,7 @@ fn told(stretches: &[Stretch], folds: &Folds) -> Vec<Term> {
 /// A lag, among these terms, that a random walk of the angle makes as well: of one that goes with a few steps of the rate,
 /// blocks that are left out in between say nothing.
 fn lag_by_chance(stretches: &[Stretch], terms: &[Term]) -> bool {
-    let values = estimate(stretches, terms, ErrorLaw::Normal);
+    let values = estimate(stretches, terms, ErrorLaw::likelier(stretches, terms));
     let spread = of_a_walk(stretches, terms, &values);
     terms.iter().zip(values).zip(spread).any(|((term, v), d)| *term == Term::Lag && v.abs() <= BY_CHANCE * d)
 }
