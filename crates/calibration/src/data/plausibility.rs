@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use crate::data::copies;
+use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
 use crate::data::references::references;
 use crate::numerics::statistics::median;
@@ -79,6 +80,7 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     if findings.broken.is_some() {
         return findings;
     }
+    interpolated::leave_out(recording, &name, &mut findings);
     let rows = recording.len();
     let held = held_rows(recording);
     let lost: usize = held.iter().map(Range::len).sum();
