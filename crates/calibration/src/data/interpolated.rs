@@ -9,36 +9,43 @@ use crate::recording::Recording;
 
 /// A row is on the chord where it is off by less than this share of the sagitta: what is drawn is off by rounding alone.
 const ON_THE_CHORD: f64 = 0.1;
-/// A sagitta tells where it is this many of the smallest steps of a channel: below, a coarse converter draws chords as well.
+/// A sagitta tells where it is this many times the resolution of a channel: below, a coarse converter draws chords as well.
 const RESOLVED: f64 = 4.0;
 /// More rows than this share lie on no chord by chance: white noise as large as the sagitta puts one in 300 there.
 const BY_CHANCE: f64 = 0.05;
 /// … and in a short recording more than so many.
 const FEWEST: usize = 8;
+/// Rows that tell a channel's resolution.
+const ENOUGH: usize = 2000;
 
 /// Leaves out rows that lie on the straight line between their neighbours, and says so.
 pub(super) fn leave_out(recording: &mut Recording, name: &str, findings: &mut Findings) {
-    let drawn = interpolated_rows(recording);
-    let lost = drawn.iter().filter(|on| **on).count();
-    if lost == 0 {
-        return;
+    let (Some(x), Some(y)) = (recording.xc_v.as_deref(), recording.yc_v.as_deref()) else { return };
+    let drawn = interpolated_rows(&recording.t_s, x, y);
+    if let Some(what) = said(&drawn, &recording.t_s) {
+        findings.warnings.push(format!("{name}: {what}"));
+        leave_out_rows(recording, &drawn);
     }
-    let stretches = places(&recording.t_s, &repeats(drawn.len(), |i| drawn[i]));
-    findings.warnings.push(format!(
-        "{name}: X and Y of {lost} of {} rows lie on straight lines between their neighbours, which a turning vibration does \
-         not: {stretches}; these rows were interpolated and are left out",
-        recording.len()
-    ));
-    leave_out_rows(recording, &drawn);
+}
+
+/// What is wrong with a recording of which these rows were drawn, if any were.
+pub(crate) fn said(drawn: &[bool], t_s: &[f64]) -> Option<String> {
+    let lost = drawn.iter().filter(|on| **on).count();
+    (lost > 0).then(|| {
+        format!(
+            "X and Y of {lost} of {} rows lie on straight lines between their neighbours, which a turning vibration does not: \
+             {}; these rows were interpolated and are left out",
+            drawn.len(),
+            places(t_s, &repeats(drawn.len(), |i| drawn[i]))
+        )
+    })
 }
 
 /// Which rows lie on the chord of their neighbours; none unless more do than by chance.
-fn interpolated_rows(recording: &Recording) -> Vec<bool> {
-    let rows = recording.len();
+pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
+    let rows = t.len();
     let mut drawn = vec![false; rows];
-    let (Some(x), Some(y)) = (recording.xc_v.as_deref(), recording.yc_v.as_deref()) else { return drawn };
-    let t = &recording.t_s;
-    let least = RESOLVED * f64::max(smallest_step(x), smallest_step(y));
+    let least = RESOLVED * f64::max(resolution(x), resolution(y));
     let mut judged = 0;
     for i in 1..rows.saturating_sub(1) {
         let share = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
@@ -58,10 +65,11 @@ fn interpolated_rows(recording: &Recording) -> Vec<bool> {
     drawn
 }
 
-/// The smallest step of a channel that is none of nothing: of a converter, its resolution.
-fn smallest_step(v: &[f64]) -> f64 {
-    let steps = v.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0);
-    steps.fold(f64::INFINITY, f64::min)
+/// The smallest distance between different values of a channel, of some of its rows: of a converter, its resolution.
+fn resolution(v: &[f64]) -> f64 {
+    let mut some: Vec<f64> = v.iter().copied().step_by((v.len() / ENOUGH).max(1)).collect();
+    some.sort_by(f64::total_cmp);
+    some.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -96,15 +104,17 @@ mod tests {
 
     #[test]
     fn a_turning_vibration_draws_no_chords() {
-        assert!(!interpolated_rows(&recorded()).contains(&true));
+        let sound = recorded();
+        let drawn = |x: &[f64], y: &[f64]| interpolated_rows(&sound.t_s, x, y).contains(&true);
+        let (Some(x), Some(y)) = (&sound.xc_v, &sound.yc_v) else { panic!() };
+        assert!(!drawn(x, y));
         // twelve bits, and steps of less than one of theirs
         for rate_dps in [500.0, 20.0, 2.0] {
             let theta = |i: usize| 0.3 - 0.78 * (rate_dps * 0.01 * i as f64).to_radians();
             let counted = |v: f64| (v * 2048.0).round();
-            let mut recording = recorded();
-            recording.xc_v = Some((0..2000).map(|i| counted(theta(i).cos())).collect());
-            recording.yc_v = Some((0..2000).map(|i| counted(theta(i).sin())).collect());
-            assert!(!interpolated_rows(&recording).contains(&true), "{rate_dps}");
+            let x: Vec<f64> = (0..2000).map(|i| counted(theta(i).cos())).collect();
+            let y: Vec<f64> = (0..2000).map(|i| counted(theta(i).sin())).collect();
+            assert!(!drawn(&x, &y), "{rate_dps}");
         }
     }
 }

@@ -4,9 +4,10 @@
 
 pub(crate) mod agreement;
 pub(crate) mod copies;
-mod interpolated;
+pub(crate) mod interpolated;
 pub(crate) mod plausibility;
 pub(crate) mod rail;
+mod rate_spikes;
 pub(crate) mod references;
 pub(crate) mod sampling;
 pub(crate) mod slips;

@@ -8,6 +8,7 @@ use std::ops::Range;
 use crate::data::copies;
 use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
+use crate::data::rate_spikes;
 use crate::data::references::references;
 use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording};
@@ -54,6 +55,7 @@ const FEWEST_COMMANDS: usize = 50;
 pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let mut findings = Findings::default();
     let name = recording.source.display().to_string();
+    rate_spikes::leave_out(recording, &name, &mut findings.warnings);
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
         Err(broken) => {
