@@ -42,6 +42,7 @@ pub(crate) fn said(drawn: &[bool], t_s: &[f64]) -> Option<String> {
 }
 
 /// Which rows lie on the chord of their neighbours; none unless more do than by chance.
+#[allow(clippy::float_cmp, reason = "a value that stands still is the same to the last bit")]
 pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
     let rows = t.len();
     let mut drawn = vec![false; rows];
@@ -52,8 +53,10 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
         let off = |v: &[f64]| v[i] - v[i - 1] - share * (v[i + 1] - v[i - 1]);
         let chord = (x[i + 1] - x[i - 1]).hypot(y[i + 1] - y[i - 1]);
         let amplitude = f64::max(x[i - 1].hypot(y[i - 1]), x[i + 1].hypot(y[i + 1]));
+        // a channel that stands still is another fault
+        let both_move = x[i] != x[i - 1] && y[i] != y[i - 1];
         let sagitta = chord * chord / (8.0 * amplitude);
-        if sagitta > least {
+        if both_move && sagitta > least {
             judged += 1;
             drawn[i] = off(x).hypot(off(y)) < ON_THE_CHORD * sagitta;
         }

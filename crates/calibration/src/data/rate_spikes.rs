@@ -70,7 +70,7 @@ mod tests {
     fn a_rate_that_leaps_for_a_row_is_named_and_left_out() {
         for (size, at) in [(1e6, 700), (-1.0, 0), (0.0, 1999), (10.0, 3)] {
             let mut recording = recorded();
-            recording.rate_dps.as_mut().unwrap()[at] *= size;
+            recording.rate_dps.iter_mut().for_each(|rate| rate[at] *= size);
             let findings = mend(&mut recording);
             assert!(findings.broken.is_none() && findings.warnings[0].contains("rate_dps leaps"), "{findings:?}");
             let said = format!("rows {0} to {0} ", at + 1);
