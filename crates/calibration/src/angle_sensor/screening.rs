@@ -6,6 +6,7 @@ use super::ellipse;
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use crate::data::copies::{copied_rows, said};
+use crate::data::interpolated::{self, interpolated_rows};
 use crate::data::plausibility::MOST_LOST;
 use crate::error::Refusal;
 use crate::numerics::angles::unwrapped;
@@ -44,7 +45,8 @@ pub(crate) fn believed(
     period: f64,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<SensorRun>, Refusal> {
-    let runs = of_one_sensor(without_copied_rows(runs, warnings)?, warnings)?;
+    let runs = without_interpolated_rows(without_copied_rows(runs, warnings)?, warnings);
+    let runs = of_one_sensor(runs, warnings)?;
     let follows: Vec<Follows> = runs.iter().map(|r| follows(r, stated, period)).collect();
     let mut told: Vec<f64> =
         follows.iter().filter_map(|f| if let Follows::Turns(g) = f { Some(*g) } else { None }).collect();
@@ -85,7 +87,7 @@ fn without_copied_rows(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Resu
     let count = runs.len();
     let mut kept = Vec::with_capacity(count);
     for run in runs {
-        let (x, y): (Vec<f64>, Vec<f64>) = run.channels().into_iter().flatten().map(|z| (z[0], z[1])).unzip();
+        let (x, y) = channels(&run);
         let copied = copied_rows(&x, &y);
         if copied.is_empty() {
             kept.push(run);
@@ -107,6 +109,24 @@ fn without_copied_rows(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Resu
         return Err(Refusal::no_answer("campaign", "X and Y are the same to the last digit in every run", wanted));
     }
     Ok(kept)
+}
+
+/// The runs without rows that were drawn between others.
+fn without_interpolated_rows(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Vec<SensorRun> {
+    let recorded = |run: SensorRun| {
+        let (x, y) = channels(&run);
+        let drawn = interpolated_rows(&run.t_s[..x.len()], &x, &y);
+        let Some(what) = interpolated::said(&drawn, &run.t_s) else { return run };
+        warnings.push(format!("{}: {what}", run.name));
+        let rows: Vec<usize> = (0..run.len()).filter(|i| !drawn[*i]).collect();
+        run.subset(&rows)
+    };
+    runs.into_iter().map(recorded).collect()
+}
+
+/// Both channels of a run; empty where it tells an angle alone.
+fn channels(run: &SensorRun) -> (Vec<f64>, Vec<f64>) {
+    run.channels().into_iter().flatten().map(|z| (z[0], z[1])).unzip()
 }
 
 /// How the angle of a run goes with its reference, by the ellipse of the run alone.

@@ -6,7 +6,9 @@
 use std::ops::Range;
 
 use crate::data::copies;
+use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
+use crate::data::rate_spikes;
 use crate::data::references::references;
 use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording};
@@ -53,6 +55,7 @@ const FEWEST_COMMANDS: usize = 50;
 pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let mut findings = Findings::default();
     let name = recording.source.display().to_string();
+    rate_spikes::leave_out(recording, &name, &mut findings.warnings);
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
         Err(broken) => {
@@ -79,6 +82,7 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     if findings.broken.is_some() {
         return findings;
     }
+    interpolated::leave_out(recording, &name, &mut findings);
     let rows = recording.len();
     let held = held_rows(recording);
     let lost: usize = held.iter().map(Range::len).sum();

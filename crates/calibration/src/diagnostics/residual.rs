@@ -132,6 +132,11 @@ impl Along {
     }
 }
 
+/// How far the longest segment goes.
+pub(crate) fn longest(evaluation: &Evaluation, along: Along) -> f64 {
+    evaluation.segments.iter().map(|s| along.step(s) * s.angle.len() as f64).fold(0.0, f64::max)
+}
+
 /// Steps that differ by less than this share count as one.
 const SAME_STEP: f64 = 0.01;
 

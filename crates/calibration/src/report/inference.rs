@@ -1,7 +1,7 @@
 //! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
 //! the campaign tells it.
 
-use cvg_model::effects::harmonic_n::scaling::DIRECTION;
+use cvg_model::effects::harmonic_n::{self, scaling::DIRECTION};
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
@@ -52,18 +52,26 @@ pub(crate) fn covering<'a>(
     beyond: f64,
     warnings: &mut Vec<String>,
 ) -> Estimate {
-    let half = all.half_width();
-    let off = |own: f64| (own - all.value).abs();
-    let contradicts = |own: f64, deviation: f64| off(own) > half.max(beyond * deviation);
-    let odd: Vec<(&str, f64)> =
-        runs.filter_map(|(run, own)| own.filter(|[v, d]| contradicts(*v, *d)).map(|[v, _]| (run, v))).collect();
-    let Some(farthest) = odd.iter().map(|(_, own)| off(*own)).max_by(f64::total_cmp) else { return all };
+    let odd = contradicting(all, runs, beyond);
+    let Some(farthest) = odd.iter().map(|(_, own)| (own - all.value).abs()).max_by(f64::total_cmp) else { return all };
     warnings.push(format!(
         "the runs do not agree on the {what}, {:.5} of all of them: {}; its interval covers them",
         all.value,
         listed(&odd)
     ));
-    all.widened(farthest - half)
+    all.widened(farthest - all.half_width())
+}
+
+/// The runs that contradict an estimate from all of them, beyond so many standard deviations of their own, each with what it
+/// tells.
+fn contradicting<'a>(
+    all: Estimate,
+    runs: impl Iterator<Item = (&'a str, Option<[f64; 2]>)>,
+    beyond: f64,
+) -> Vec<(&'a str, f64)> {
+    let half = all.half_width();
+    let contradicts = |own: f64, deviation: f64| (own - all.value).abs() > half.max(beyond * deviation);
+    runs.filter_map(|(run, own)| own.filter(|[v, d]| contradicts(*v, *d)).map(|[v, _]| (run, v))).collect()
 }
 
 /// The first of runs with what each tells, for a message.
@@ -74,6 +82,17 @@ fn listed(runs: &[(&str, f64)]) -> String {
 /// An estimate with an interval that reaches to what single runs tell.
 fn reaching(all: Estimate, runs: &[(&str, f64)]) -> Estimate {
     runs.iter().fold(all, |e, (_, own)| Estimate { ci95: [e.ci95[0].min(*own), e.ci95[1].max(*own)], ..e })
+}
+
+/// The share by which a correction without a cause slows a nominal precession, rad/s, if it is mechanics: by ½ p²/(kΩ)² of a
+/// precession p sin nθ. An error A sin nθ of the angle is one of n A kΩ.
+fn slowing(m: &Member, nominal: f64) -> f64 {
+    let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    if m.id == EffectId::HarmonicN {
+        return 0.5 * (m.values[0] * harmonic_n::factor(m.values[3], nominal)).powi(2) * square(&m.values[1..3]);
+    }
+    let is_mechanics = m.id.description().stage == Stage::Mechanics;
+    if is_mechanics { 0.5 * square(&m.values) / (nominal * nominal) } else { 0.0 }
 }
 
 impl Inference<'_> {
@@ -101,10 +120,7 @@ impl Inference<'_> {
         let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
         let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
         let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
-        let slowed: f64 = causeless
-            .filter(|m| m.id.description().stage == Stage::Mechanics)
-            .map(|m| 0.5 * m.values.iter().map(|v| v * v).sum::<f64>() / (nominal * nominal))
-            .sum();
+        let slowed: f64 = causeless.map(|m| slowing(m, nominal)).sum();
         let open = slowed + self.dataset.screen.references_apart;
         let estimate = estimate.widened(open * estimate.value.abs());
         let estimate = covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings);
@@ -176,11 +192,14 @@ impl Inference<'_> {
     }
 
     /// The detection gain ratio with an interval that also covers what the runs would tell of it without anisodamping, where
-    /// the two are separated by a run that no other bears out: ½(g − 1) sin 2θ of the readout beside Δ(1/τ)/(4kΩ) sin 2θ of
-    /// the mechanics. Were that run of another instrument, the difference would be that of two ratios.
+    /// the two are separated by a run that no other bears out, or the runs contradict each other in the angular gain:
+    /// ½(g − 1) sin 2θ of the readout beside Δ(1/τ)/(4kΩ) sin 2θ of the mechanics. Were a run of another instrument, the
+    /// difference would be that of two ratios.
     fn borne_out(&self, ratio: Estimate, warnings: &mut Vec<String>) -> Estimate {
         let damping = self.hypothesis().member(EffectId::Anisodamping).map_or(0.0, |m| m.values[1]);
-        if self.dataset.instrument == Instrument::Sensor || !self.dataset.rests_on_one_run() {
+        let gain = self.estimate(Unknown::AngularGain);
+        let contradicted = !contradicting(gain, self.own_angular_gains(), UNBELIEVED).is_empty();
+        if self.dataset.instrument == Instrument::Sensor || !(self.dataset.rests_on_one_run() || contradicted) {
             return ratio;
         }
         let alone = |rate: f64| ratio.value - 0.5 * damping / self.hypothesis().precession(rate);
@@ -190,8 +209,8 @@ impl Inference<'_> {
             return ratio;
         }
         warnings.push(format!(
-            "the detection gain ratio, {:.5}, and anisodamping are separated by a run that no other bears out: without \
-             anisodamping the runs differ in the ratio, {}, and its interval covers them; a rotation run at yet another rate \
+            "the detection gain ratio, {:.5}, and anisodamping are separated by a run that no other bears out, or that contradicts \
+             others: without anisodamping the runs differ in the ratio, {}, and its interval covers them; a rotation run at yet another rate \
              would tell",
             ratio.value,
             listed(&odd)

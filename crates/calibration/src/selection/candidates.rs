@@ -4,7 +4,9 @@
 use cvg_model::effects::{EffectId, Role as ParameterRole, Search, Stage, Values, harmonic_n};
 
 use crate::diagnostics::evaluate::Evaluation;
-use crate::diagnostics::residual::{Along, drift_power, resolved_harmonics, strongest_harmonics, strongest_line};
+use crate::diagnostics::residual::{
+    Along, drift_power, longest, resolved_harmonics, strongest_harmonics, strongest_line,
+};
 use crate::estimation::joint_fit::Dataset;
 use crate::facts::Follows;
 use crate::model::hypothesis::Hypothesis;
@@ -70,7 +72,7 @@ pub(crate) fn candidates(
                     .iter()
                     .any(|m| m.id == id && same(p, &m.values) && chosen.is_none_or(|c| same(c, &m.values)))
             };
-            let (found, tried) = proposals(dataset, residual, dense, over);
+            let (found, tried) = proposals(dataset, hypothesis, residual, dense, over);
             let proposed = found.into_iter().map(|(value, choice)| {
                 let mut values = id.neutral();
                 values[p] = value;
@@ -110,7 +112,13 @@ pub(crate) fn candidates(
 
 /// Values that a searched parameter could take with what goes with each of them, strongest first, and how many were
 /// looked at.
-fn proposals(dataset: &Dataset, residual: &Evaluation, dense: &Evaluation, over: Search) -> (Vec<(f64, f64)>, f64) {
+fn proposals(
+    dataset: &Dataset,
+    hypothesis: &Hypothesis,
+    residual: &Evaluation,
+    dense: &Evaluation,
+    over: Search,
+) -> (Vec<(f64, f64)>, f64) {
     match over {
         Search::PatternHarmonic => {
             let most = resolved_harmonics(residual, Follows::Pattern, PATTERN_HARMONICS);
@@ -140,8 +148,13 @@ fn proposals(dataset: &Dataset, residual: &Evaluation, dense: &Evaluation, over:
             let strongest = lines.first().map_or(0.0, |l| l.1);
             let line =
                 dataset.speeds_differ().then(|| strongest_line(residual, Along::Table, 2.0 * strongest)).flatten();
+            let resolved = BROKEN_ORDER.max(1.0 / longest(residual, Along::Table).max(1.0));
+            let of_the_pattern = |order: f64| {
+                READOUT_HARMONICS.iter().any(|n| (order - n * hypothesis.angular_gain.abs()).abs() < resolved)
+            };
             let broken = line.filter(|(order, _)| {
-                *order > 0.5 && *order < f64::from(most) && (order - order.round()).abs() > BROKEN_ORDER
+                let is_broken = (order - order.round()).abs() > BROKEN_ORDER && !of_the_pattern(*order);
+                is_broken && *order > 0.5 && *order < f64::from(most)
             });
             found.splice(0..0, broken.map(|(order, _)| (order, 0.0)));
             (found, f64::from(most.max(1)))
@@ -157,8 +170,11 @@ fn proposals(dataset: &Dataset, residual: &Evaluation, dense: &Evaluation, over:
     }
 }
 
-/// An order of the table this far from a whole one is broken.
+/// An order of the table this far from a whole one is broken, unless the pattern turns as often: what repeats with that is the
+/// gyroscope's own.
 const BROKEN_ORDER: f64 = 0.02;
+/// Harmonics of the pattern that a readout and its drives make.
+const READOUT_HARMONICS: [f64; 4] = [2.0, 4.0, 6.0, 8.0];
 /// A line in time takes this many times more out of the residual than a slow drift of every run could.
 const LINE_OVER_DRIFT: f64 = 1.5;
 
