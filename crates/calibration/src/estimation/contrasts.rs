@@ -10,6 +10,8 @@ use crate::recording::Role;
 const SAME_RATE: f64 = 0.05;
 /// Amplitudes that differ by less than this share count as one.
 const SAME_AMPLITUDE: f64 = 0.05;
+/// Runs bear out what one tells of the mechanics where their inverse rates without it are this share as far apart.
+const BORNE_OUT: f64 = 0.1;
 /// A rate that changes by more than this share within a run varies.
 const VARYING_RATE: f64 = 0.2;
 /// Stretches of a segment over which its rate is taken, and the share of all that are left out at either end.
@@ -50,6 +52,14 @@ fn speeds_differ(rates: &[Vec<f64>]) -> bool {
     !speeds.is_empty() && speeds[speeds.len() - 1 - edge] > (1.0 + SAME_RATE) * speeds[edge]
 }
 
+/// How far apart the inverse rates are, s/rad: what mechanics do to the angle goes with that, and what a readout does stays.
+fn lever(rates: &[Vec<f64>]) -> f64 {
+    let mut inverse: Vec<f64> = rates.iter().flatten().map(|r| 1.0 / r).collect();
+    inverse.sort_by(f64::total_cmp);
+    let edge = inverse.len() / EDGE;
+    if inverse.is_empty() { 0.0 } else { inverse[inverse.len() - 1 - edge] - inverse[edge] }
+}
+
 impl Dataset {
     /// Rates of the table over short stretches of one fitted segment after the other, rad/s; stops left out.
     fn stretches(&self) -> Vec<Vec<f64>> {
@@ -61,13 +71,20 @@ impl Dataset {
     /// others would not: no other run bears out what it says, and were it of another instrument, nothing would contradict.
     /// A run whose own rate varies tells them by itself; one that is held out bears out what was fitted.
     pub(crate) fn rests_on_one_run(&self) -> bool {
-        let differ = |of: &dyn Fn(usize) -> bool| {
+        let rates = |of: &dyn Fn(usize) -> bool| {
             let these = self.tracks.iter().enumerate().filter(|(at, _)| of(*at));
-            let rates = stretches(these.map(|(_, p)| (&p.track, p.track.segments.clone())));
+            stretches(these.map(|(_, p)| (&p.track, p.track.segments.clone())))
+        };
+        let differ = |of: &dyn Fn(usize) -> bool| {
+            let rates = rates(of);
             both_directions(&rates) || speeds_differ(&rates)
         };
+        let lever = |of: &dyn Fn(usize) -> bool| lever(&rates(of));
         let all = || 0..self.tracks.len();
-        all().any(|one| !differ(&|at| at != one)) && !all().any(|one| differ(&|at| at == one)) && differ(&|_| true)
+        let least = BORNE_OUT * lever(&|_| true);
+        all().any(|one| lever(&|at| at != one) < least)
+            && !all().any(|one| differ(&|at| at == one))
+            && differ(&|_| true)
     }
 
     /// The rate changes within a fitted run, as in a turn there and back.
