@@ -309,8 +309,8 @@ impl<T: Float> Instrument<T> {
         state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
         let mut correction_rad_s = state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s());
         match orders {
-            Orders::Rest | Orders::Run { .. } => {}
-            Orders::Listen => correction_rad_s = self.listening(state),
+            // the loop's, if it has one from before a fault
+            Orders::Rest | Orders::Listen | Orders::Run { .. } => {}
             Orders::Sweep { correction_rad_s: swept, opposed } => {
                 let v = self.sweep_v;
                 let forces = AxisForces { x_c: zero, x_s: v, y_c: zero, y_s: if opposed { -v } else { v } };
@@ -338,11 +338,6 @@ impl<T: Float> Instrument<T> {
         state.seen = Seen { v_as: zero, v_qc: zero, v_qs: zero, correction_rad_s, ..state.seen };
     }
 
-    /// The correction while listening: the loop's, if it has one from before a fault.
-    fn listening(&self, state: &State<T>) -> T {
-        state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s())
-    }
-
     /// Loops start anew.
     fn forget(&self, state: &mut State<T>) {
         state.energy = PiState::default();
@@ -351,6 +346,8 @@ impl<T: Float> Instrument<T> {
         state.lock = LockState::default();
     }
 
+    //= specs/dsp.md#commands-behind-the-drives
+    //# The commands by which a readout is compensated MUST be those that the drives were made of whatever the oscillator is corrected by.
     /// The moment of the window, for readout effects that depend on it.
     #[cold]
     #[inline(never)]

@@ -105,10 +105,12 @@ pub(crate) fn read(repository: &Path) -> Result<Named, String> {
     let evidence = |path: &Path| path.components().any(|c| c.as_os_str().to_string_lossy().starts_with("proof"));
     let calls = flight::calls(repository)?;
     for file in source::rust_files(&repository.join("crates")) {
-        if evidence(&file) || file.starts_with(repository.join("crates/xtask")) {
+        // within the repository, which may lie anywhere
+        let within = file.strip_prefix(repository).unwrap_or(&file);
+        if evidence(within) || within.starts_with("crates/xtask") {
             continue;
         }
-        let place = file.strip_prefix(repository).unwrap_or(&file).display().to_string();
+        let place = within.display().to_string();
         let text = text(&file)?;
         for function in source::functions(Path::new(&place), &text) {
             let name = flight::in_full(&text, &function);
