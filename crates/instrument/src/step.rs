@@ -9,6 +9,7 @@ use cvg_model::effects::Moment;
 use cvg_model::{AxisForces, ControlOutputs, Envelope, Float, Pendulum};
 
 use crate::continuity::{Continuity, Sight};
+use crate::correction::ordered;
 use crate::drives::put_out;
 use crate::{Instrument, MOST_COMPENSATED, Seen, State, Status};
 
@@ -307,19 +308,16 @@ impl<T: Float> Instrument<T> {
         let (e, p) = (&e, &p);
         let zero = T::zero();
         state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
-        let mut correction_rad_s = state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s());
+        let limit_rad_s = self.oscillator.limit_rad_s();
+        let mut correction_rad_s = ordered(&orders, &state.lock, &state.beat, self.per_window_s, limit_rad_s);
         match orders {
-            // the loop's, if it has one from before a fault
             Orders::Rest | Orders::Listen | Orders::Run { .. } => {}
-            Orders::Sweep { correction_rad_s: swept, opposed } => {
+            Orders::Sweep { opposed, .. } => {
                 let v = self.sweep_v;
                 let forces = AxisForces { x_c: zero, x_s: v, y_c: zero, y_s: if opposed { -v } else { v } };
-                state.drive = self.delay.undone(&forces, swept);
-                correction_rad_s = swept;
+                state.drive = self.delay.undone(&forces, correction_rad_s);
             }
             Orders::Tune => {
-                let off = state.beat.radians_per_window() * self.per_window_s;
-                correction_rad_s = (correction_rad_s + off).bounded(self.oscillator.limit_rad_s());
                 self.forget(state);
                 state.lock = LockState { detuning_rad_s: correction_rad_s };
             }

@@ -117,9 +117,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "what was heard sets any frequency",
-        "instrument/src/step.rs",
-        "correction_rad_s = (correction_rad_s + off).bounded(self.oscillator.limit_rad_s());",
-        "correction_rad_s = correction_rad_s + off;",
+        "instrument/src/correction.rs",
+        "kept + beat.radians_per_window() * per_window_s,",
+        "return kept + beat.radians_per_window() * per_window_s,",
         JOINED,
     ),
     fault(
