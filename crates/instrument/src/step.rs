@@ -237,16 +237,10 @@ impl<T: Float> Instrument<T> {
         // false where the compensation found no vibration behind the readout
         let valid = !spoilt && pendulum.e.is_finite();
         let was_in_operation = in_operation(state.supervisor.mode);
-        let (moved, interrupted) = if !valid {
-            (Movement::Unknown, false)
-        } else if self.precession.step_steadily(&mut state.precession, &pendulum) {
-            (Movement::Steady, false)
-        } else {
-            // a direction from nowhere, or none any more
-            let directed = state.precession.is_directed();
-            let moved = self.precession.step_otherwise(&mut state.precession, &pendulum);
-            (moved, directed && moved == Movement::Unknown)
-        };
+        let directed = state.precession.is_directed();
+        let moved = if valid { self.precession.step(&mut state.precession, &pendulum) } else { Movement::Unknown };
+        // a direction from nowhere, or none any more
+        let interrupted = valid && directed && moved == Movement::Unknown;
         let observation = Observation { pendulum, valid, clipped, repeats, jumped: moved == Movement::Jumped };
         let beat = match state.supervisor.mode {
             Mode::Listen => {

@@ -183,8 +183,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a jump in a spoilt window is one",
         "instrument/src/step.rs",
-        "let (moved, interrupted) = if !valid {",
-        "let (moved, interrupted) = if spoilt {",
+        "let moved = if valid { self.precession",
+        "let moved = if !spoilt { self.precession",
         JOINED,
     ),
     fault(

@@ -62,8 +62,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a first direction is an interruption",
         "instrument/src/step.rs",
-        "(moved, directed && moved == Movement::Unknown)",
-        "(moved, moved == Movement::Unknown)",
+        "let interrupted = valid && directed && moved",
+        "let interrupted = valid && moved",
         OPEN_LOOP,
     ),
     fault(
