@@ -213,10 +213,11 @@ fn of_another_claim(text: &str, proof: &str) -> Option<String> {
     let more: Vec<_> = twin.difference(&says).copied().collect();
     let less: Vec<_> = says.difference(&twin).copied().collect();
     let refuted = matches!(more[..], ["rejects"] | ["WRONG" | "TOO_TIGHT", "rejects"] | ["rejects_rounding"]);
-    // holds outside of what a constant says why
-    let shown = match less[..] {
+    // holds outside of what constants say why
+    let constant = |word: &&str| word.chars().all(|c| c.is_ascii_uppercase() || c == '_');
+    let shown = match &less[..] {
         ["holds" | "bounded"] => true,
-        [reason, "holds_outside"] => reason.chars().all(|c| c.is_ascii_uppercase() || c == '_'),
+        [reasons @ .., "holds_outside"] => !reasons.is_empty() && reasons.iter().all(constant),
         _ => false,
     };
     (!refuted || !shown).then(|| format!("{proof}: {less:?} against {more:?}"))

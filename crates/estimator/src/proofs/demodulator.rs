@@ -42,8 +42,8 @@ fn samples_are_admitted_within_the_range<T: Float + Arbitrary>(share: T) {
     }
 }
 
-//= specs/dsp.md#bounded-commands
-//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// A sample of any bits that [`Demodulator::takes`] is a number within the converter's range, and [`Demodulator::admit`] makes one of
 /// any other; what is none is counted, and the counters do not overflow.
 #[kani::proof]
