@@ -137,7 +137,11 @@ enum Converter {
     AtItsWorst(f64),
 }
 
-/// The angle that the instrument shows after the first window, off by how much, and the bound, degrees.
+/// Windows in a row.
+const WINDOWS: u16 = 3;
+
+/// The angle that the instrument shows after each of the first windows, off by how much at most, and the bound, degrees. Which of the
+/// half turns it begins in does not matter; it has to stay there, also where the pattern lies on the cut.
 fn off_by<T: Float>(
     s: &Settings<'_>,
     chain: &Chain,
@@ -149,7 +153,8 @@ fn off_by<T: Float>(
     let mut state = instrument.start();
     let step = 2.0 * s.adc_full_scale_v / 2.0_f64.powi(chain.bits.cast_signed());
     let e = orbit.envelope();
-    for k in 0..s.window {
+    let (mut most, mut half_turns) = (0.0_f64, None);
+    for k in 0..WINDOWS * s.window {
         let (sin, cos) = (chain.step_rad * f64::from(k)).sin_cos();
         let gain = chain.undone * chain.left;
         let read = [e.x_c * cos + e.x_s * sin + offset[0], gain * (e.y_c * cos + e.y_s * sin) + offset[1]];
@@ -162,10 +167,14 @@ fn off_by<T: Float>(
                 read[c] + 0.5 * step * worst.signum()
             }
         });
-        instrument.step(&mut state, T::from_f64(coded[0]), T::from_f64(coded[1]));
+        let (_, _, status) = instrument.step(&mut state, T::from_f64(coded[0]), T::from_f64(coded[1]));
+        if status.fresh {
+            let turned = state.angle_deg() - orbit.theta.to_degrees();
+            let begun = *half_turns.get_or_insert(180.0 * (turned / 180.0).round());
+            most = most.max((turned - begun).abs());
+        }
     }
-    let turned = state.angle_deg() - orbit.theta.to_degrees();
-    [(turned - 180.0 * (turned / 180.0).round()).abs(), chain.degrees()]
+    [most, chain.degrees()]
 }
 
 fn chain(s: &Settings<'_>, bits: u32, epsilon: f64, amplitude_v: f64) -> Chain {

@@ -354,3 +354,49 @@ fn identity_the_direction_is_equation_4() {
 fn identity_the_direction_is_equation_4_twin() {
     rejects(WRONG, direction);
 }
+
+/// Why [`direction_of_twice_the_angle`] claims nothing on a path that no unit vector takes: 2 + 2|cos 2θ| is at most 4.
+const LONGER: &str = "a squared length above eight, which is at most four";
+
+/// Any envelope, and any unit vector of twice an angle.
+fn direction_of_twice_the_angle(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
+    let [x_c, x_s, y_c, y_s] = ["x_c", "x_s", "y_c", "y_s"].map(Exact::real);
+    let (sin_2, cos_2) = Exact::angle("2θ").sin_cos();
+    let d = major_axis_of(&Envelope::new(x_c, x_s, y_c, y_s), cos_2, sin_2);
+    let (one, two) = (Exact::one(), Exact::two());
+    let size = if cos_2 < Exact::zero() { -cos_2 } else { cos_2 };
+    let wide = one + size;
+    proof.positive("(1 + |cos 2θ|)² + sin² 2θ", wide * wide + sin_2 * sin_2, one, two, &[(two * size, one)])?;
+    if d.status != Status::Valid {
+        if wide * wide + sin_2 * sin_2 > Exact::ratio(8, 1) {
+            proof.may_be_empty(LONGER);
+            proof.outside(LONGER);
+            return Ok(());
+        }
+        let (cos, sin) = if cos_2 < Exact::zero() { (sin_2, wide) } else { (wide, sin_2) };
+        let in_phase = cos * x_c + sin * y_c;
+        proof.not_negative_by_path("nothing in phase along it", -(in_phase * in_phase))?;
+        proof.outside(ACROSS);
+        return Ok(());
+    }
+    proof.equal("length", d.cos * d.cos + d.sin * d.sin, planted * planted * planted)?;
+    proof.equal("cos 2θ", d.cos * d.cos - d.sin * d.sin, planted * cos_2)?;
+    proof.equal("sin 2θ", two * d.sin * d.cos, planted * sin_2)
+}
+
+//= specs/electronics.md#direction-is-a-unit-vector
+//= type=test
+//# The direction of the major axis MUST have the length one up to rounding.
+//= specs/electronics.md#direction-of-equation-4
+//= type=test
+//# The direction of the major axis MUST be the angle of Equation 4 up to half a turn.
+/// As the instrument finds it: from cos 2θ and sin 2θ.
+#[test]
+fn identity_the_direction_of_twice_the_angle_is_equation_4() {
+    holds_outside(&[ACROSS, LONGER], direction_of_twice_the_angle);
+}
+
+#[test]
+fn identity_the_direction_of_twice_the_angle_is_equation_4_twin() {
+    rejects(WRONG, direction_of_twice_the_angle);
+}

@@ -1,7 +1,7 @@
 //! The supervisor under any sequence of observations: it ends in operation or in a fault with a name, counts what it saw,
 //! and finds back once all is as it should be.
 
-use cvg_controller::supervisor::{Beat, LONG_REST, Observation};
+use cvg_controller::supervisor::{Beat, Observation};
 use cvg_controller::{Mode, Supervisor, SupervisorSettings, SupervisorState};
 use cvg_model::Pendulum;
 use proptest::prelude::*;
@@ -16,6 +16,8 @@ const COAST: u32 = 6;
 const ENDURE: u32 = 7;
 const REST: u32 = 9;
 const FORGET: u32 = 60;
+/// By so much a rest is longer after too many starts; the number that the book gives.
+const LONG_REST: u32 = 64;
 const SWEEPS: u8 = 3;
 /// Windows of a start: twice each mode's longest time, with each sweep twice as long as the last.
 const BUDGET: u32 = 2 * ((1 + SWEEPS as u32) * LISTEN + (1 + 2 + 4) * SWEEP + LOCK + SPIN_UP + COAST);

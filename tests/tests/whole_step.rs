@@ -7,7 +7,7 @@ use cvg_controller::{ActuationCompensation, Allocation, Fault, OrbitCommands, Pi
 use cvg_estimator::{LockState, PhaseLock, Precession, PrecessionState};
 use cvg_instrument::{Instrument, Mode, Settings, State, Wish};
 use cvg_model::effects::{EffectId, Values};
-use cvg_model::{ControlOutputs, Pendulum};
+use cvg_model::{ControlOutputs, Envelope, Pendulum};
 use cvg_tests::domain::patterns;
 use cvg_tests::{Scalar, for_each_scalar};
 use proptest::prelude::*;
@@ -67,6 +67,13 @@ fn beyond<T: Scalar>(s: &Settings<'_>, state: &State<T>) -> Option<&'static str>
         ("a fault without a name", state.supervisor.mode != Mode::Fault || state.supervisor.fault.is_some()),
     ];
     bounds.iter().find(|(_, holds)| !holds).map(|(name, _)| *name)
+}
+
+/// Whether what was commanded, and the oscillator's correction, are within their limits.
+fn commands_are_bounded<T: Scalar>(s: &Settings<'_>, state: &State<T>) -> bool {
+    let (seen, volts) = (&state.seen, FRAC_1_SQRT_2 * s.dac_limit_v * 1.0005);
+    [seen.v_as, seen.v_qc, seen.v_qs].iter().all(|v| v.to_f64().abs() <= volts)
+        && seen.correction_rad_s.to_f64().abs() <= most_rad_s(s) * 1.0005
 }
 
 /// Anything within the bounds; what has none is any bits.
@@ -191,6 +198,30 @@ for_each_scalar! {
         }
         prop_assert!(steps >= 1, "no control step");
         prop_assert_eq!(beyond(&settings, &state), None, "{:?}", state);
+    }
+
+    //= specs/dsp.md#whole-step
+    //= type=test
+    //# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
+    /// What loops and trackers remember may be anything: each control step, whatever it orders, commands no more than the limit
+    /// and corrects the oscillator by no more than the band.
+    #[test]
+    fn prop_whatever_is_remembered_what_is_commanded_is_bounded(which in 0_usize..4, kind in 0_u8..5, seed in any::<u64>()) {
+        let (settings, mut dice) = (settings(which), ChaCha8Rng::seed_from_u64(seed));
+        let instrument = Instrument::<T>::new(&settings).expect("inside its domain");
+        let mut state: State<T> = anywhere_within(&settings, &mut dice);
+        let mut bits = || T::from_pattern(dice.next_u64());
+        (state.energy.integral, state.quadrature.integral, state.rate.integral) = (bits(), bits(), bits());
+        (state.lock.detuning_rad_s, state.seen.correction_rad_s) = (bits(), bits());
+        (state.precession.cos_2, state.precession.sin_2, state.precession.sin_2_per_window) = (bits(), bits(), bits());
+        for _ in 0..3 {
+            state.beat.add(&Envelope::new(bits(), bits(), bits(), bits()));
+        }
+        for k in 0..3 * usize::from(settings.window) {
+            let [x, y] = sample(&settings, kind, k, &mut dice);
+            let (_, _, status) = instrument.step(&mut state, x, y);
+            prop_assert!(!status.fresh || commands_are_bounded(&settings, &state), "{:?}", state);
+        }
     }
 
     //= specs/dsp.md#short-way

@@ -59,6 +59,38 @@ fn identity_a_phase_put_ahead_keeps_the_size_of_the_forces_twin() {
     rejects(WRONG, a_phase_put_ahead_keeps_the_size_of_the_forces);
 }
 
+fn what_was_put_ahead_is_taken_back(proof: &mut Proof, planted: Exact) -> Result<(), Refusal> {
+    let [x_c, x_s, y_c, y_s] = ["f_xc", "f_xs", "f_yc", "f_ys"].map(Exact::real);
+    let (cos, sin) = (Exact::nonzero("c"), Exact::real("s"));
+    let f = AxisForces { x_c, x_s, y_c, y_s }.ahead(cos, sin).behind(cos, sin);
+    proof.equal("X in phase", f.x_c, planted * x_c)?;
+    proof.equal("X in quadrature", f.x_s, planted * x_s)?;
+    proof.equal("Y in phase", f.y_c, planted * y_c)?;
+    proof.equal("Y in quadrature", f.y_s, planted * y_s)
+}
+
+//= specs/dsp.md#commands-behind-the-drives
+//= type=test
+//# The commands by which a readout is compensated MUST be those that the drives were made of whatever the oscillator is corrected by.
+/// For all reals but c = 0, a quarter of a turn, which the test below is of.
+#[test]
+fn identity_what_was_put_ahead_is_taken_back() {
+    holds(what_was_put_ahead_is_taken_back);
+}
+
+#[test]
+fn identity_what_was_put_ahead_is_taken_back_twin() {
+    rejects(WRONG, what_was_put_ahead_is_taken_back);
+}
+
+#[test]
+fn what_was_put_ahead_by_a_quarter_of_a_turn_is_taken_back() {
+    let f = AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.0, y_s: 0.25 };
+    for sin in [1.0, -1.0, 0.5, -4.0] {
+        assert_eq!(f.ahead(0.0, sin).behind(0.0, sin), f);
+    }
+}
+
 /// The unit vector that the tracker keeps.
 struct TrackersVector;
 

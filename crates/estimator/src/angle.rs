@@ -149,7 +149,8 @@ impl<T: Float> PatternAngle<T> {
             }
             Period::FullTurn => (e.y_c.atan2(e.x_c), e.x_c * e.x_c + e.y_c * e.y_c),
         };
-        if !(line_2.is_finite() && angle.is_finite()) {
+        // the angle of what has a finite length is finite
+        if !line_2.is_finite() {
             (T::zero(), Status::Invalid)
         } else if line_2 > least_2 {
             let half = self.period.half_rad::<T>();

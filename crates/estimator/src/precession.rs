@@ -54,7 +54,7 @@ impl<T: Float> Precession<T> {
     /// A tracker of windows of `window_s` (> 0). The rate's low-pass has the time constant `smoothing_s` (≥ window_s);
     /// a pattern that moves faster than `fastest_rad_s` and by more than `least_jump_rad` in a window has jumped (a
     /// jump has to be below 45°); directions are turned ahead by `lead_s` (≥ 0); a line amplitude √(a² − q²) below
-    /// `least_v` has no direction.
+    /// `least_v` has no direction, which is above 4e-10 V in `f32`.
     ///
     /// # Errors
     /// A parameter outside its domain.
@@ -80,15 +80,21 @@ impl<T: Float> Precession<T> {
         if !(lead_s >= 0.0 && lead_s < 10.0 * window_s) {
             return refused("lead_s", "not negative and below ten windows");
         }
-        if !(least_v > 0.0 && least_v.is_finite()) {
-            return refused("least_v", "finite and positive");
+        let least_2 = T::from_f64(least_v * least_v);
+        // the square that a root is taken of has all its digits: it is less than its next neighbour, and finite
+        let square = least_2 * least_2;
+        if !(least_v > 0.0 && square * (T::one() + T::epsilon()) > square) {
+            return refused(
+                "least_v",
+                "positive, its fourth power neither below nor beyond the numbers of full precision",
+            );
         }
         Ok(Self {
             share: T::from_f64(window_s / smoothing_s),
             jump_sin_2: T::from_f64(Real::sin_cos(2.0 * jump).0),
             half_lead: T::from_f64(0.5 * lead_s / window_s),
             window_s: T::from_f64(window_s),
-            least_2: T::from_f64(least_v * least_v),
+            least_2,
         })
     }
 

@@ -4,7 +4,7 @@ use core::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use approx::assert_abs_diff_eq;
 use cvg_estimator::{Direction, Movement, Precession, PrecessionState, Status};
-use cvg_model::{Envelope, Pendulum};
+use cvg_model::{Envelope, Float, Pendulum};
 
 const WINDOW_S: f64 = 0.5;
 const SMOOTHING_S: f64 = 2.0;
@@ -239,6 +239,34 @@ fn a_direction_that_is_led_ahead_is_as_valid_as_it_was() {
     for status in [Status::Valid, Status::Undetermined, Status::Invalid] {
         assert_eq!(tracker().ahead(&state, &Direction { cos: 0.6, sin: 0.8, status }).status, status);
     }
+}
+
+/// The faintest and the strongest line amplitudes that may be the least one, V: of a line that has a direction with them the
+/// vector has the length one, at every angle.
+fn least_lines_have_directions<T: Float>(faint_v: f64, strong_v: f64) {
+    let new = |v: f64| Precession::<T>::new(WINDOW_S, SMOOTHING_S, FASTEST_RAD_S, LEAST_JUMP_RAD, 0.75, v);
+    for refused in [0.7 * faint_v, 1e-12 * faint_v, 1.01 * strong_v, 1e12 * strong_v] {
+        assert_eq!(new(refused).err().map(|e| e.parameter), Some("least_v"), "{refused}");
+    }
+    for least_v in [faint_v, 1e-3, 1.0, 0.99 * strong_v] {
+        let tracker = new(least_v).expect("within its domain");
+        for degree in 0..360 {
+            let (sin, cos) = f64::from(degree).to_radians().sin_cos();
+            let line = 1.001 * least_v * least_v;
+            let zero = T::zero();
+            let p = Pendulum { e: zero, q: zero, r: T::from_f64(line * cos), s: T::from_f64(line * sin), l: zero };
+            let mut state = PrecessionState::default();
+            tracker.step(&mut state, &p);
+            let length = state.cos_2.to_f64().hypot(state.sin_2.to_f64());
+            assert!((length - 1.0).abs() < 4.0 * T::epsilon().to_f64(), "{least_v} V, {degree} deg: {length}");
+        }
+    }
+}
+
+#[test]
+fn a_least_line_whose_square_leaves_the_range_of_the_numbers_is_refused() {
+    least_lines_have_directions::<f32>(3.3e-10, 4.29e9);
+    least_lines_have_directions::<f64>(1.3e-77, 1.157e77);
 }
 
 #[test]

@@ -41,10 +41,10 @@ impl<T: Float> Delay<T> {
     /// The commands of a drive that [`Delay::undone`] gave.
     pub(crate) fn done(&self, drive: &AxisForces<T>, correction_rad_s: T) -> AxisForces<T> {
         let (cos, sin) = self.phase(correction_rad_s);
-        drive.ahead(cos, -sin)
+        drive.behind(cos, sin)
     }
 
-    /// Cosine and sine of the carrier's phase in the delay.
+    /// Cosine and sine of the carrier's phase in the delay, both √(1 + (correction · delay)²) times as large.
     #[inline(always)]
     fn phase(&self, correction_rad_s: T) -> (T, T) {
         // the correction's own share is small: first order
@@ -55,12 +55,26 @@ impl<T: Float> Delay<T> {
 
 #[cfg(test)]
 mod tests {
+    use cvg_model::AxisForces;
+
     use super::Delay;
 
     #[test]
     fn a_correction_turns_less_than_a_radian_in_the_delay() {
         for (limit_rad_s, accepted) in [(1.0, true), (1.999, true), (2.0, false), (2.1, false)] {
             assert_eq!(Delay::<f32>::new(0.5, 1e5, limit_rad_s).is_ok(), accepted, "{limit_rad_s}");
+        }
+    }
+
+    #[test]
+    fn the_commands_of_a_drive_are_those_that_it_was_made_of() {
+        let f = AxisForces { x_c: 0.3, x_s: -0.2, y_c: 0.1, y_s: 0.4 };
+        let delay = Delay::<f64>::new(1e-4, 1e5, 9e3).expect("less than a radian");
+        for correction_rad_s in [0.0, 400.0, -400.0, 9e3, -9e3] {
+            let g = delay.done(&delay.undone(&f, correction_rad_s), correction_rad_s);
+            for (got, made_of) in [(g.x_c, f.x_c), (g.x_s, f.x_s), (g.y_c, f.y_c), (g.y_s, f.y_s)] {
+                assert!((got - made_of).abs() < 1e-15, "{correction_rad_s}: {g:?}");
+            }
         }
     }
 }

@@ -25,6 +25,7 @@
 #![forbid(unsafe_code)]
 
 pub mod continuity;
+mod correction;
 mod delay;
 mod drives;
 #[cfg(test)]

@@ -5,5 +5,6 @@
 //! assumption is either a "precondition:" of the function or a "budget:" of the solver.
 
 pub mod continuity;
+pub mod correction;
 pub mod drives;
 pub mod short_way;

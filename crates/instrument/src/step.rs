@@ -9,6 +9,7 @@ use cvg_model::effects::Moment;
 use cvg_model::{AxisForces, ControlOutputs, Envelope, Float, Pendulum};
 
 use crate::continuity::{Continuity, Sight};
+use crate::correction::ordered;
 use crate::drives::put_out;
 use crate::{Instrument, MOST_COMPENSATED, Seen, State, Status};
 
@@ -236,16 +237,10 @@ impl<T: Float> Instrument<T> {
         // false where the compensation found no vibration behind the readout
         let valid = !spoilt && pendulum.e.is_finite();
         let was_in_operation = in_operation(state.supervisor.mode);
-        let (moved, interrupted) = if !valid {
-            (Movement::Unknown, false)
-        } else if self.precession.step_steadily(&mut state.precession, &pendulum) {
-            (Movement::Steady, false)
-        } else {
-            // a direction from nowhere, or none any more
-            let directed = state.precession.is_directed();
-            let moved = self.precession.step_otherwise(&mut state.precession, &pendulum);
-            (moved, directed && moved == Movement::Unknown)
-        };
+        let directed = state.precession.is_directed();
+        let moved = if valid { self.precession.step(&mut state.precession, &pendulum) } else { Movement::Unknown };
+        // a direction from nowhere, or none any more
+        let interrupted = valid && directed && moved == Movement::Unknown;
         let observation = Observation { pendulum, valid, clipped, repeats, jumped: moved == Movement::Jumped };
         let beat = match state.supervisor.mode {
             Mode::Listen => {
@@ -307,19 +302,16 @@ impl<T: Float> Instrument<T> {
         let (e, p) = (&e, &p);
         let zero = T::zero();
         state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
-        let mut correction_rad_s = state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s());
+        let limit_rad_s = self.oscillator.limit_rad_s();
+        let mut correction_rad_s = ordered(&orders, &state.lock, &state.beat, self.per_window_s, limit_rad_s);
         match orders {
-            Orders::Rest | Orders::Run { .. } => {}
-            Orders::Listen => correction_rad_s = self.listening(state),
-            Orders::Sweep { correction_rad_s: swept, opposed } => {
+            Orders::Rest | Orders::Listen | Orders::Run { .. } => {}
+            Orders::Sweep { opposed, .. } => {
                 let v = self.sweep_v;
                 let forces = AxisForces { x_c: zero, x_s: v, y_c: zero, y_s: if opposed { -v } else { v } };
-                state.drive = self.delay.undone(&forces, swept);
-                correction_rad_s = swept;
+                state.drive = self.delay.undone(&forces, correction_rad_s);
             }
             Orders::Tune => {
-                let off = state.beat.radians_per_window() * self.per_window_s;
-                correction_rad_s = (correction_rad_s + off).bounded(self.oscillator.limit_rad_s());
                 self.forget(state);
                 state.lock = LockState { detuning_rad_s: correction_rad_s };
             }
@@ -338,11 +330,6 @@ impl<T: Float> Instrument<T> {
         state.seen = Seen { v_as: zero, v_qc: zero, v_qs: zero, correction_rad_s, ..state.seen };
     }
 
-    /// The correction while listening: the loop's, if it has one from before a fault.
-    fn listening(&self, state: &State<T>) -> T {
-        state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s())
-    }
-
     /// Loops start anew.
     fn forget(&self, state: &mut State<T>) {
         state.energy = PiState::default();
@@ -351,6 +338,8 @@ impl<T: Float> Instrument<T> {
         state.lock = LockState::default();
     }
 
+    //= specs/dsp.md#commands-behind-the-drives
+    //# The commands by which a readout is compensated MUST be those that the drives were made of whatever the oscillator is corrected by.
     /// The moment of the window, for readout effects that depend on it.
     #[cold]
     #[inline(never)]

@@ -194,6 +194,16 @@ impl<T: Real> AxisForces<T> {
         }
     }
 
+    //= specs/dsp.md#commands-behind-the-drives
+    //# The commands by which a readout is compensated MUST be those that the drives were made of whatever the oscillator is corrected by.
+    /// The forces of which [`AxisForces::ahead`] by the same `cos` and `sin` made these, also where the two have not the length
+    /// 1: F e^{−iφ}/|e^{iφ}|² on each axis. Not finite where both are 0.
+    pub fn behind(&self, cos: T, sin: T) -> Self {
+        let size_2 = cos * cos + sin * sin;
+        let turned = self.ahead(cos, -sin);
+        Self { x_c: turned.x_c / size_2, x_s: turned.x_s / size_2, y_c: turned.y_c / size_2, y_s: turned.y_s / size_2 }
+    }
+
     //= specs/equation-08.md#what-each-force-moves
     //# Each force along the orbit MUST move the property of the orbit that is its own: f_as the amplitude, f_qs the orientation, f_qc the quadrature and f_ac the phase, with the signs −, −, + and −.
     /// The rate at which these forces move the envelope: F/(2iω) with F = f_c − i f_s, so that the in-phase part

@@ -165,10 +165,14 @@ fn readouts_of_the_angle_turn_the_vibration() {
         let error = size * (0.01 * (3.0 * theta).cos() - 0.02 * (3.0 * theta).sin());
         reads(EffectId::HarmonicN, [3.0, 0.01, 0.02, scaling], turned(error), 1e-14);
     }
-    // Newton's iteration ends at rounding where the harmonic is weak, and stays finite where it folds
-    let weak = [5.0, 0.01, -0.01, 0.0];
-    let back = EffectId::HarmonicN.unread(&weak, EffectId::HarmonicN.read(&weak, VIBRATION, &now()), &now());
-    assert_near(back, VIBRATION);
+    // Newton's iteration ends at rounding where n A f is up to 0.3, and stays finite where it folds
+    for n in [1.0, 2.0, 5.0, 60.0] {
+        for k in 0..64 {
+            let values = [n, 0.18 / n, -0.24 / n, 0.0];
+            let e = VIBRATION.turned((TAU * f64::from(k) / 64.0).sin(), (TAU * f64::from(k) / 64.0).cos());
+            assert_near(EffectId::HarmonicN.unread(&values, EffectId::HarmonicN.read(&values, e, &now()), &now()), e);
+        }
+    }
     let folded = EffectId::HarmonicN.unread(&[720.0, 0.5, 0.5, 0.0], VIBRATION, &now());
     assert_abs_diff_eq!(folded.pendulum().e, VIBRATION.pendulum().e, epsilon = 1e-14);
     // where the angle stands still under the harmonic there is no step: 1 − 2 · ½ = 0
@@ -382,8 +386,11 @@ fn inverses_have_the_form_that_is_told_of_them() {
 
 #[test]
 fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
-    let readout: Vec<_> =
-        EffectId::ALL.iter().map(|id| id.description()).filter(|d| d.stage == Stage::Readout).map(|d| d.id).collect();
+    let at =
+        |stage| EffectId::ALL.iter().map(|id| id.description()).filter(|d| d.stage == stage).map(|d| d.id).collect();
+    // amplifiers, then axes
+    let actuation: Vec<_> = at(Stage::Actuation);
+    assert_eq!(actuation, ["drive-saturation", "actuation-gain-mismatch", "actuation-skew", "actuation-phase"]);
     // what is added to the angle of the vibration, then plates, axes, amplifier, and the converter
     let angle = ["harmonic-n", "time-periodic", "angle-latency"];
     let channels = [
@@ -392,14 +399,14 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-skew",
         "detection-gain-mismatch",
         "gain-drift",
+        "temperature",
         "detection-phase",
         "drive-feedthrough",
         "detection-offset",
         "detection-saturation",
     ];
-    let listed = [&angle[..], &channels].concat();
-    let known: Vec<_> = readout.into_iter().filter(|id| listed.contains(id)).collect();
-    assert_eq!(known, listed);
+    let readout: Vec<_> = at(Stage::Readout);
+    assert_eq!(readout, [&angle[..], &channels].concat());
     for &id in EffectId::ALL {
         assert_eq!(id.acts_on_angle(), angle.contains(&id.description().id), "{id}");
     }

@@ -16,6 +16,7 @@ mod reading;
 mod regression;
 mod second_reading;
 mod single;
+mod third_reading;
 mod unseen;
 mod upkeep;
 
@@ -69,6 +70,7 @@ fn library() -> Vec<Fault> {
         single::FAULTS,
         meaning::FAULTS,
         second_reading::FAULTS,
+        third_reading::FAULTS,
     ]
     .concat()
 }

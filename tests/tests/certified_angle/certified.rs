@@ -2,7 +2,9 @@
 //!
 //! The book's page on the certified angle derives each link and says what it rests on.
 
-use core::f64::consts::PI;
+use core::f64::consts::{PI, SQRT_2};
+
+use cvg_tests::tolerances::{ANGLE, PENDULUM, Tolerance};
 
 /// What the bound depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +64,11 @@ impl Chain {
         }
     }
 
+    /// Semi-minor over semi-major axis, at most, of what the compensation leaves of the orbit.
+    fn seen_roundness(&self) -> f64 {
+        self.roundness * self.left.max(1.0 / self.left)
+    }
+
     /// The angle, in degrees, by which an envelope that is off by `error_v` (V, the length of the four errors) is off.
     pub(crate) fn turned_deg(&self, error_v: f64) -> f64 {
         let length = self.amplitude_v * self.left.min(1.0) - error_v;
@@ -71,7 +78,7 @@ impl Chain {
         }
         // on the sphere of (R, S, Q)/E; its latitudes are those of Q/E
         let beta = 2.0 * sine.asin();
-        let q = self.roundness * self.left.max(1.0 / self.left);
+        let q = self.seen_roundness();
         let latitude = (2.0 * q / (1.0 + q * q)).asin();
         if latitude + 2.0 * beta >= 0.5 * PI {
             return 90.0;
@@ -80,13 +87,15 @@ impl Chain {
         if along < 1.0 { (0.5 * along.asin()).to_degrees() } else { 90.0 }
     }
 
-    /// Equation 4 in the machine by the unit vector that the tracker keeps, degrees: the bound that intervals prove, for the
-    /// eccentricity.
+    /// Equations 2 and 4 in the machine, degrees: R and S are each off by what intervals prove of E, of any four components, which turns
+    /// the circle that they lie on; and what intervals prove of the angle of any R and S by the unit vector that the tracker keeps.
     pub(crate) fn angle_rounding_deg(&self) -> f64 {
-        let q2 = self.roundness * self.roundness;
-        let proved = if self.epsilon > 1e-10 { 2e-6 } else { 4e-15 };
+        let q2 = self.seen_roundness() * self.seen_roundness();
+        let single = self.epsilon > 1e-10;
+        let proved = |of: &Tolerance| if single { of.f32 } else { of.f64 };
+        let of_r_and_s = 0.5 * (SQRT_2 * proved(&PENDULUM) * (1.0 + q2) / (1.0 - q2)).asin();
         // and the angle in degrees once more
-        (proved * (1.0 + q2) / (1.0 - q2)).to_degrees() + 180.0 * f64::EPSILON
+        (of_r_and_s + proved(&ANGLE)).to_degrees() + 180.0 * f64::EPSILON
     }
 
     /// All links: their names and degrees.

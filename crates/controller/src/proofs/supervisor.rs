@@ -111,8 +111,8 @@ fn supervisor_is_total<T: Float + Arbitrary>(kept: impl Fn(&Observation<T>) -> b
     }
 }
 
-//= specs/dsp.md#bounded-commands
-//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// [`Supervisor::step`] does not panic or overflow for any state, observation and beat; a fault keeps its name and the
 /// drives off; an invalid window and the wish for rest turn them off.
 #[kani::proof]

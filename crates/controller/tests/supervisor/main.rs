@@ -8,7 +8,7 @@ mod settings;
 mod start;
 mod table;
 
-use cvg_controller::supervisor::{Beat, LONG_REST, Observation, Orders};
+use cvg_controller::supervisor::{Beat, Observation, Orders};
 use cvg_controller::{Fault, Mode, Supervisor, SupervisorSettings, SupervisorState, Wish};
 use cvg_model::Pendulum;
 
@@ -26,6 +26,8 @@ const COAST: u32 = 6;
 const ENDURE: u32 = 7;
 const REST: u32 = 9;
 const FORGET: u32 = 11;
+/// By so much a rest is longer after too many starts; the number that the book gives.
+const LONG_REST: u32 = 64;
 /// Windows in a row that make a lock or a spin-up, and that show a converter to be stuck.
 const IN_A_ROW: u32 = 20;
 const WINDOW_S: f64 = 0.25;

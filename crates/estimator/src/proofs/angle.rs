@@ -119,8 +119,8 @@ fn beat_is_bounded<T: Float + Arbitrary>(share: T) {
     assert!(cos.is_finite() && sin.is_finite());
 }
 
-//= specs/dsp.md#start
-//# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// [`Beat::radians_per_window`] after [`Beat::add`] lies within half a turn and [`phase_ahead`] is finite, for any bits of
 /// sums and envelope; the count does not overflow.
 #[kani::proof]

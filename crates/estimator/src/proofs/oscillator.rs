@@ -86,8 +86,8 @@ fn phasor_is_bounded<T: Float + Arbitrary>(longest: T) {
     assert!(next.cos.magnitude() <= T::ratio(8, 1) && next.sin.magnitude() <= T::ratio(8, 1));
 }
 
-//= specs/dsp.md#bounded-commands
-//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// The phasor of [`Oscillator::tune`] is below two and its step below two, for any bits of phasor and correction, and the
 /// phasor of [`Phasor::advanced`] after it is finite.
 #[kani::proof]

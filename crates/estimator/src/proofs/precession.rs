@@ -88,8 +88,8 @@ fn direction_ahead_is_bounded<T: Float + Arbitrary>(longest: T) {
     assert!(within.magnitude() <= T::half() * T::PI);
 }
 
-//= specs/dsp.md#bounded-commands
-//# Every output of the instrument MUST be finite and within the converter's limit for every input and every state.
+//= specs/dsp.md#whole-step
+//# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// The direction of [`Precession::ahead`] stays below 64 and the angle of [`PrecessionState::angle`] within 90°, for any bits
 /// of the state.
 #[kani::proof]

@@ -36,13 +36,19 @@ fn trackers_are_assumed<T: Float>() {
             for jump in spread(core::f64::consts::FRAC_PI_4) {
                 for lead in spread(10.0) {
                     let (smoothing_s, lead_s) = (smoothing * window_s, lead * window_s);
-                    let Ok(built) =
-                        Precession::<T>::new(window_s, smoothing_s, 0.5 * jump / window_s, 0.5 * jump, lead_s, 1e-3)
-                    else {
-                        continue;
-                    };
-                    assert!(precession::assumed(&built), "{window_s} s: {smoothing}, {jump} rad, {lead}");
-                    accepted += 1;
+                    for least_v in [1e-160, 1e-40, 1e-22, 1e-3, 1e3, 1e22, 1e160] {
+                        let fastest_rad_s = 0.5 * jump / window_s;
+                        let Ok(built) =
+                            Precession::<T>::new(window_s, smoothing_s, fastest_rad_s, 0.5 * jump, lead_s, least_v)
+                        else {
+                            continue;
+                        };
+                        assert!(
+                            precession::assumed(&built),
+                            "{window_s} s: {smoothing}, {jump} rad, {lead}, {least_v}"
+                        );
+                        accepted += 1;
+                    }
                 }
             }
         }

@@ -53,11 +53,11 @@ pub fn twin_outputs_are_within_the_limit_f64() {
 fn drives_are_within_eight_limits<T: Float + Arbitrary>(times: i32) {
     // precondition: what the settings accept: a sine, a cosine, and less than a radian that a correction may turn
     let within = |most: T| kani::any_where(move |v: &T| v.magnitude() <= most);
-    // budget: limits of a millionth to a million volts
-    let limit: T = kani::any_where(|l: &T| *l >= T::from_f64(1e-6) && *l <= T::from_f64(1e6));
+    // precondition: limits that the settings accept: converters of 1e-9 to 1e9 V
+    let limit: T = kani::any_where(|l: &T| *l >= T::from_f64(1e-10) && *l <= T::from_f64(1e10));
     let delay = Delay { cos: within(T::one()), sin: within(T::one()), s: kani::any() };
     let correction: T = kani::any();
-    // precondition: a correction within its limit, which is proved of the phase loop
+    // precondition: a correction within its limit, which is proved of the phase loop and of what is ordered where it does not run
     kani::assume((correction * delay.s).magnitude() <= T::one());
     let forces = AxisForces { x_c: within(limit), x_s: within(limit), y_c: within(limit), y_s: within(limit) };
     let drive = delay.undone(&forces, correction);

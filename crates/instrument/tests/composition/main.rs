@@ -24,11 +24,17 @@ const LATE: &[(EffectId, Values<f64>)] = &[
     (EffectId::HarmonicN, [2.0, 1e-10, 0.0, 3.0]),
 ];
 const CLIPPED: &[(EffectId, Values<f64>)] = &[(EffectId::DetectionSaturation, [0.9, 0.0, 0.0, 0.0])];
+const FED: &[(EffectId, Values<f64>)] = &[
+    (EffectId::DetectionGainMismatch, [0.991, 0.0, 0.0, 0.0]),
+    (EffectId::DriveFeedthrough, [0.03, -0.02, -0.01, 0.05]),
+];
 const DRIVES: &[(EffectId, Values<f64>)] = &[
     (EffectId::ActuationGainMismatch, [1.0113, 0.0, 0.0, 0.0]),
     (EffectId::ActuationSkew, [0.02, 0.0, 0.0, 0.0]),
     (EffectId::ActuationPhase, [0.03, 0.0, 0.0, 0.0]),
 ];
+
+const SETTINGS: usize = 5;
 
 /// Settings of which no two that belong to different parts are the same number.
 fn settings(which: usize) -> Settings<'static> {
@@ -60,6 +66,8 @@ fn settings(which: usize) -> Settings<'static> {
         0 => Settings { sweep_s: 0.05, actuation: DRIVES, ..Settings::default() },
         1 => Settings { readout: UNEVEN, actuation: DRIVES, ..other },
         2 => Settings { readout: LATE, ..other },
+        // a delay of so many samples that a detuning turns the drives far
+        3 => Settings { readout: FED, drive_delay_s: 83e-6, dac_limit_v: 4.0, ..other },
         _ => Settings { readout: CLIPPED, window: 24, hold_rad: -0.2, ..Settings::default() },
     }
 }
@@ -111,7 +119,7 @@ fn compare<T: Float>(which: usize, script: &[Event]) -> Vec<Mode> {
 
 /// Times that no script is long enough for are in what the parts are made of.
 fn is_made_of_its_parts<T: Float>() {
-    for which in 0..4 {
+    for which in 0..SETTINGS {
         let settings = settings(which);
         let instrument = format!("{:?}", Instrument::<T>::new(&settings).expect("inside its domain"));
         for part in Parts::<T>::of(&settings).shown() {
@@ -127,7 +135,7 @@ fn every_part_is_made_of_the_settings() {
 }
 
 fn all_settings<T: Float>(script: &[Event]) -> Vec<Vec<Mode>> {
-    (0..4).map(|which| compare::<T>(which, script)).collect()
+    (0..SETTINGS).map(|which| compare::<T>(which, script)).collect()
 }
 
 /// In operation, for so many windows more.
@@ -136,9 +144,12 @@ fn running(more: u32) -> Vec<Event> {
 }
 
 fn in_both_precisions(script: &[Event], passes: &[Mode]) {
-    for modes in all_settings::<f32>(script).into_iter().chain(all_settings::<f64>(script)).step_by(2) {
-        for mode in passes {
-            assert!(modes.contains(mode), "{mode:?} is not among {modes:?}");
+    for modes in [all_settings::<f32>(script), all_settings::<f64>(script)] {
+        // elsewhere windows are too short, or the vibration too much another one, for all that a script is for
+        for which in [0, 2] {
+            for mode in passes {
+                assert!(modes[which].contains(mode), "{which}: {mode:?} is not among {:?}", modes[which]);
+            }
         }
     }
 }
@@ -226,7 +237,7 @@ fn a_fault_and_the_way_back() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
     #[test]
-    fn whatever_happens_in_whatever_order(which in 0_usize..4, events in prop::collection::vec(event(), 1..24)) {
+    fn whatever_happens_in_whatever_order(which in 0..SETTINGS, events in prop::collection::vec(event(), 1..24)) {
         let script: Vec<Event> = running(20).into_iter().chain(events).collect();
         compare::<f32>(which, &script);
         compare::<f64>(which, &script);

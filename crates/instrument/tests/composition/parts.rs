@@ -159,8 +159,8 @@ impl<T: Float> Parts<T> {
         let mut valid = measured.status == Measured::Valid;
         let rate = self.precession.rate_rad_s(&s.precession);
         let zero = T::zero();
-        // none of the effects here is made of commands
-        let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
+        // what the drives were made of, at the correction of then
+        let drive = self.delayed(&s.drive, s.seen.correction_rad_s);
         let at = Moment { t_s: zero, table_rad: zero, precession_rad_s: rate, warmer_k: zero, drive };
         s.fingerprint = now;
         s.seen.readout = measured.envelope;
@@ -248,11 +248,25 @@ impl<T: Float> Parts<T> {
         s.seen = Seen { v_as, v_qc, v_qs, correction_rad_s: rad_s, ..s.seen };
     }
 
-    /// Turned ahead by the phase that passes until the output acts.
-    fn undelayed(&self, f: &AxisForces<T>, rad_s: T) -> AxisForces<T> {
+    /// Cosine and sine of the phase that passes until the output acts.
+    fn passes(&self, rad_s: T) -> (T, T) {
         let more = rad_s * self.delay_s;
         let (cos_0, sin_0) = self.delay;
-        let (cos, sin) = (cos_0 - sin_0 * more, sin_0 + cos_0 * more);
+        (cos_0 - sin_0 * more, sin_0 + cos_0 * more)
+    }
+
+    /// Turned back by the phase that passes until the output acts, and divided by what that lengthens.
+    fn delayed(&self, f: &AxisForces<T>, rad_s: T) -> AxisForces<T> {
+        let (cos, sin) = self.passes(rad_s);
+        let by = cos * cos + sin * sin;
+        let back = |c: T, s: T| ((c * cos - s * sin) / by, (s * cos + c * sin) / by);
+        let ((x_c, x_s), (y_c, y_s)) = (back(f.x_c, f.x_s), back(f.y_c, f.y_s));
+        AxisForces { x_c, x_s, y_c, y_s }
+    }
+
+    /// Turned ahead by the phase that passes until the output acts.
+    fn undelayed(&self, f: &AxisForces<T>, rad_s: T) -> AxisForces<T> {
+        let (cos, sin) = self.passes(rad_s);
         let ahead = |c: T, s: T| (c * cos + s * sin, s * cos - c * sin);
         let ((x_c, x_s), (y_c, y_s)) = (ahead(f.x_c, f.x_s), ahead(f.y_c, f.y_s));
         AxisForces { x_c, x_s, y_c, y_s }

@@ -54,6 +54,11 @@ fn settings_are_taken_up_to_their_edges_and_refused_beyond_by_name() {
         assert_eq!(new(change, taken), (None, None), "{name} = {taken}");
         assert_eq!(new(change, refused), (Some(name), Some(name)), "{name} = {refused}");
     }
+    // a line of a fifth of it, to the fourth power, is no number of full precision in f32
+    let heard: Change = |s, v| s.heard_v = v;
+    assert_eq!(new(heard, 1.7e-9), (None, None));
+    assert_eq!(new(heard, 1e-9), (Some("least_v"), None));
+    assert_eq!(new(heard, 1e-80), (Some("least_v"), Some("least_v")));
     // half a sample of the hold, and delays in which 1.1 times the band turns by a radian
     for of_readout in [0.0, 1e-5] {
         let wide = |beyond: f64| {

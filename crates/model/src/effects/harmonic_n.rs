@@ -72,7 +72,7 @@ impl Effect for HarmonicN {
     }
 }
 
-/// Newton steps of the inverse; from θ_d they reach f64 rounding for n A f ≤ 0.1.
+/// Newton steps of the inverse; from θ_d they reach f64 rounding for n A f ≤ 0.3.
 const NEWTON_STEPS: usize = 4;
 
 /// Values of the parameter `scaling`.

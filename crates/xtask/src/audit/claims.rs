@@ -66,6 +66,8 @@ pub(crate) struct Test {
 pub(crate) struct Harness {
     pub(crate) name: String,
     pub(crate) requirements: Vec<String>,
+    /// functions that it is about and that nobody calls in the instrument
+    pub(crate) uncalled: Vec<String>,
 }
 
 /// Everything that is named.
@@ -96,19 +98,24 @@ pub(crate) fn read(repository: &Path) -> Result<Named, String> {
             named.tests.extend(tests);
         }
     }
+    let (calls, known) = (flight::calls(repository)?, flight::known(repository)?);
+    let called = |name: &str| calls.keys().any(|(n, _)| n == name);
     for harness in prove::harnesses(repository)? {
         if harness.function.name.starts_with("proof_") && !harness.function.name.starts_with("proof_guard_") {
             let requirements = harness.function.citations.iter().map(|c| c.target.clone()).collect();
-            named.harnesses.push(Harness { name: harness.function.name.clone(), requirements });
+            let uncalled = source::subjects(&harness.function.doc);
+            let uncalled = uncalled.into_iter().filter(|name| known.contains(name) && !called(name)).collect();
+            named.harnesses.push(Harness { name: harness.function.name.clone(), requirements, uncalled });
         }
     }
     let evidence = |path: &Path| path.components().any(|c| c.as_os_str().to_string_lossy().starts_with("proof"));
-    let calls = flight::calls(repository)?;
     for file in source::rust_files(&repository.join("crates")) {
-        if evidence(&file) || file.starts_with(repository.join("crates/xtask")) {
+        // within the repository, which may lie anywhere
+        let within = file.strip_prefix(repository).unwrap_or(&file);
+        if evidence(within) || within.starts_with("crates/xtask") {
             continue;
         }
-        let place = file.strip_prefix(repository).unwrap_or(&file).display().to_string();
+        let place = within.display().to_string();
         let text = text(&file)?;
         for function in source::functions(Path::new(&place), &text) {
             let name = flight::in_full(&text, &function);

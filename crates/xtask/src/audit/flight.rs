@@ -1,9 +1,11 @@
 //! Who calls a function in the instrument: what nobody calls there does not fly, whatever is proved of it.
 //!
 //! It reads names, as `source` does: a function is called by another if its name stands in the other's body and the type
-//! that it belongs to in the other's file (in the instrument and in the calibrator: in the crate).
+//! that it belongs to in the other's file (in the instrument and in the calibrator: in the crate). What is called on `self`, on one
+//! of its fields or by its type's name is of that type alone: `self.precession.step_steadily(…)` is no call of `step`, and
+//! `self.supervisor.step(…)` none of the tracker's.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::Path;
 
@@ -31,6 +33,17 @@ struct Node {
 
 /// What the public functions of the instrument and of the calibrator call, directly or not.
 pub(crate) fn calls(repository: &Path) -> Result<Calls, String> {
+    let (nodes, scopes) = firmware(repository)?;
+    Ok(reached(&nodes, &scopes))
+}
+
+/// Every function of the crates for firmware, as `Type::name`.
+pub(crate) fn known(repository: &Path) -> Result<BTreeSet<String>, String> {
+    Ok(firmware(repository)?.0.iter().map(called).collect())
+}
+
+/// The functions of the crates for firmware, and the texts that say what their calls may mean.
+fn firmware(repository: &Path) -> Result<(Vec<Node>, Vec<String>), String> {
     let (mut nodes, mut scopes) = (Vec::new(), Vec::<String>::new());
     for (name, begins) in CRATES {
         let folder = repository.join("crates").join(name).join("src");
@@ -50,7 +63,7 @@ pub(crate) fn calls(repository: &Path) -> Result<Calls, String> {
             nodes.extend(functions(place, &text, scopes.len() - 1, begins));
         }
     }
-    Ok(reached(&nodes, &scopes))
+    Ok((nodes, scopes))
 }
 
 /// The text without its comments.
@@ -93,26 +106,118 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).filter(|w| !w.is_empty())
 }
 
+/// What stands before the name of a function where it is called.
+#[derive(Debug, PartialEq)]
+enum Receiver {
+    /// one of these types
+    Of(BTreeSet<String>),
+    /// anything
+    Unknown,
+}
+
+/// Types, and what a name in a text may be of.
+struct Types {
+    /// struct, field: the words of its type
+    fields: BTreeMap<(String, String), BTreeSet<String>>,
+    owners: BTreeSet<String>,
+    traits: BTreeSet<String>,
+}
+
+impl Types {
+    fn of(nodes: &[Node], scopes: &[String]) -> Self {
+        let owners = nodes.iter().filter_map(|n| n.owner.clone()).collect();
+        let (mut fields, mut traits) = (BTreeMap::new(), BTreeSet::new());
+        for text in scopes {
+            let mut open: Option<String> = None;
+            for line in text.lines() {
+                let line = line.trim_end();
+                let named =
+                    |word: &str| line.split_once(word).and_then(|(_, rest)| words(rest).next()).map(str::to_owned);
+                if !line.starts_with(' ') {
+                    open = if line.contains("struct ") && line.ends_with('{') { named("struct ") } else { None };
+                    traits.extend(if line.contains("trait ") { named("trait ") } else { None });
+                } else if let (Some(owner), Some((name, kind))) = (&open, line.split_once(": ")) {
+                    let field = words(name).last().unwrap_or_default().to_owned();
+                    fields.insert((owner.clone(), field), words(kind).map(str::to_owned).collect());
+                }
+            }
+        }
+        Self { fields, owners, traits }
+    }
+
+    /// The words of `body` that `caller` says, each with what it is said of.
+    fn said(&self, caller: &Node, body: &str) -> Vec<(String, Receiver)> {
+        // a chain of calls may be broken over lines
+        let flat: String = body.split('.').map(str::trim_end).collect::<Vec<_>>().join(".");
+        let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let mut found = Vec::new();
+        let mut rest = flat.as_str();
+        let mut at = 0;
+        while let Some(begin) = rest.find(word) {
+            let length = rest[begin..].find(|c| !word(c)).unwrap_or(rest.len() - begin);
+            let name = &rest[begin..begin + length];
+            found.push((name.to_owned(), self.receiver(caller, &flat[..at + begin])));
+            at += begin + length;
+            rest = &flat[at..];
+        }
+        found
+    }
+
+    fn receiver(&self, caller: &Node, before: &str) -> Receiver {
+        let own = |owner: &Option<String>| match owner {
+            Some(owner) => Receiver::Of(self.traits.iter().cloned().chain([owner.clone()]).collect()),
+            None => Receiver::Unknown,
+        };
+        if let Some(path) = before.strip_suffix("::") {
+            return match words(path).last() {
+                Some("Self") => own(&caller.owner),
+                Some(name) if self.owners.contains(name) => Receiver::Of([name.to_owned()].into()),
+                _ => Receiver::Unknown,
+            };
+        }
+        let Some(chain) = before.strip_suffix('.') else { return Receiver::Unknown };
+        let begin = chain.rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.')).map_or(0, |k| k + 1);
+        match chain[begin..].split('.').collect::<Vec<_>>()[..] {
+            ["self"] => own(&caller.owner),
+            ["self", field] => {
+                let key = (caller.owner.clone().unwrap_or_default(), field.to_owned());
+                let kinds = self.fields.get(&key).into_iter().flatten().filter(|k| self.owners.contains(*k));
+                let kinds: BTreeSet<String> = kinds.cloned().collect();
+                if kinds.is_empty() { Receiver::Unknown } else { Receiver::Of(kinds) }
+            }
+            _ => Receiver::Unknown,
+        }
+    }
+}
+
 fn reached(nodes: &[Node], scopes: &[String]) -> Calls {
+    let types = Types::of(nodes, scopes);
     let mut found = Calls::new();
     let mut chains: Vec<Option<Vec<String>>> = vec![None; nodes.len()];
     let mut waiting: VecDeque<usize> = (0..nodes.len()).filter(|k| nodes[*k].begins).collect();
     for k in &waiting {
         chains[*k] = Some(vec![called(&nodes[*k])]);
     }
-    let known: Vec<std::collections::BTreeSet<&str>> = scopes.iter().map(|s| words(s).collect()).collect();
+    let known: Vec<BTreeSet<&str>> = scopes.iter().map(|s| words(s).collect()).collect();
     while let Some(k) = waiting.pop_front() {
         let chain = chains[k].clone().unwrap_or_default();
         let caller = &nodes[k];
         // beyond its first line, which has its own name
         let body = caller.function.body.split_once('{').map_or("", |(_, body)| body);
-        let said: std::collections::BTreeSet<&str> = words(body).collect();
+        let said = types.said(caller, body);
         for (j, node) in nodes.iter().enumerate() {
             let of_its_type = node.owner.as_ref().is_none_or(|o| {
                 caller.owner.as_ref() == Some(o) && caller.scope == node.scope
                     || known[caller.scope].contains(o.as_str())
             });
-            if chains[j].is_none() && said.contains(node.function.name.as_str()) && of_its_type {
+            let named = || {
+                let of_it = |receiver: &Receiver| match receiver {
+                    Receiver::Of(kinds) => node.owner.as_ref().is_some_and(|o| kinds.contains(o)),
+                    Receiver::Unknown => true,
+                };
+                said.iter().any(|(word, receiver)| *word == node.function.name && of_it(receiver))
+            };
+            if chains[j].is_none() && of_its_type && named() {
                 let mut longer = chain.clone();
                 longer.push(called(node));
                 chains[j] = Some(longer);
@@ -174,6 +279,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_called_on_a_field_is_of_its_type_and_of_no_other() {
+        let text = "pub struct Whole<T> {\n    part: Part<T>,\n    pub(crate) other: Option<Other<T>>,\n    sum: T,\n}\n\n\
+            impl<T> Whole<T> {\n    pub fn run(&self) {\n        self.part\n            .step();\n        self.helper();\n        \
+            Third::make();\n    }\n\n    fn helper(&self) {\n    }\n}\n\n\
+            impl<T> Part<T> {\n    fn step(&self) {\n    }\n\n    fn make(&self) {\n    }\n}\n\n\
+            impl<T> Other<T> {\n    fn step(&self) {\n    }\n\n    fn helper(&self) {\n    }\n}\n\n\
+            impl<T> Third<T> {\n    fn make() {\n    }\n}\n";
+        let nodes = functions(Path::new("a.rs"), text, 0, true);
+        let found = reached(&nodes, &[code(text)]);
+        let names: Vec<&str> = found.keys().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["Part::step", "Third::make", "Whole::helper", "Whole::run"]);
+    }
+
+    #[test]
     fn every_requirement_is_on_what_flies_or_says_why_not() {
         let repository = crate::repository();
         let named = super::super::claims::read(&repository).expect("readable");
@@ -211,7 +330,9 @@ mod tests {
         let found = calls(&crate::repository()).expect("readable");
         let flies = |name: &str, file: &str| found.contains_key(&(name.to_owned(), format!("crates/{file}")));
         assert!(flies("major_axis_of", "estimator/src/direction.rs"));
-        assert!(flies("Precession::step_otherwise", "estimator/src/precession.rs"));
+        assert!(flies("Precession::step", "estimator/src/precession.rs"));
+        // the instrument takes, admits and adds its samples itself
+        assert!(!flies("Demodulator::accumulate", "estimator/src/demodulator.rs"));
         assert!(flies("DetectionCubic::unread", "model/src/effects/detection_cubic.rs"));
         assert!(
             !flies("PatternAngle::step", "estimator/src/angle.rs")

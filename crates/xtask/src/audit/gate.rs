@@ -48,6 +48,7 @@ pub(crate) fn faults(record: &Record, named: &Named, results: &Results) -> Vec<S
         }
     }
     found.extend(citations(named));
+    found.extend(proved_of_what_nobody_calls(named));
     for (chapter, all) in &record.chapters {
         for judged in all {
             found.extend(requirement(judged));
@@ -71,6 +72,25 @@ fn citations(named: &Named) -> Vec<String> {
     let of_harnesses = named.harnesses.iter().flat_map(|h| h.requirements.iter().map(String::as_str));
     let lost = of_tests.chain(of_harnesses).filter(|target| !known.contains(target));
     lost.map(|target| format!("{target} is cited and does not exist")).collect()
+}
+
+/// Harnesses that show a requirement of the instrument on a function that nobody calls there.
+fn proved_of_what_nobody_calls(named: &Named) -> Vec<String> {
+    let all: Vec<_> = named.chapters.iter().flat_map(|c| &c.requirements).collect();
+    let excused = |id: &String, name: &String| {
+        let of_it = all.iter().find(|r| r.id == *id).and_then(|r| r.not_flown.as_ref());
+        of_it.is_some_and(|why| why.contains(&format!("`{name}`")))
+    };
+    let mut found = Vec::new();
+    for h in &named.harnesses {
+        for name in &h.uncalled {
+            let whole = h.requirements.iter().filter(|id| !excused(id, name));
+            found.extend(
+                whole.map(|id| format!("{id}: {} is about {name}, which nobody calls in the instrument", h.name)),
+            );
+        }
+    }
+    found
 }
 
 fn requirement(judged: &Judged) -> Vec<String> {
@@ -179,7 +199,8 @@ mod tests {
             let tests = ENDS.map(|name| test(n, name, false)).into_iter();
             named.tests.extend(tests.chain(["interval_d", "interval_d_twin"].map(|name| test(n, name, true))));
             let name = format!("proof_{n}");
-            named.harnesses.push(Harness { name: name.clone(), requirements: vec![id.clone()] });
+            let requirements = vec![id.clone()];
+            named.harnesses.push(Harness { name: name.clone(), requirements, uncalled: Vec::new() });
             named.functions.insert(id, vec![meets("f", true)]);
             results.proofs.push(Proof {
                 name,

@@ -340,8 +340,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the least line is compared with its square",
         "estimator/src/precession.rs",
-        "least_2: T::from_f64(least_v * least_v),",
-        "least_2: T::from_f64(least_v),",
+        "let least_2 = T::from_f64(least_v * least_v);",
+        "let least_2 = T::from_f64(least_v);",
         PRECESSION,
     ),
     fault(

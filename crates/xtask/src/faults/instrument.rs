@@ -183,15 +183,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a jump in a spoilt window is one",
         "instrument/src/step.rs",
-        "let (moved, interrupted) = if !valid {",
-        "let (moved, interrupted) = if spoilt {",
+        "let moved = if valid { self.precession",
+        "let moved = if !spoilt { self.precession",
         JOINED,
     ),
     fault(
         "what was heard sets the frequency backwards",
-        "instrument/src/step.rs",
-        "(correction_rad_s + off).bounded",
-        "(correction_rad_s - off).bounded",
+        "instrument/src/correction.rs",
+        "kept + beat.",
+        "kept - beat.",
         JOINED,
     ),
     fault(
@@ -273,9 +273,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a beat that was heard tunes beyond the band",
-        "instrument/src/step.rs",
-        "(correction_rad_s + off).bounded(self.oscillator.limit_rad_s())",
-        "correction_rad_s + off",
+        "instrument/src/correction.rs",
+        "    asked.bounded(limit_rad_s)",
+        "    asked",
         JOINED,
     ),
     fault(

@@ -62,8 +62,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a first direction is an interruption",
         "instrument/src/step.rs",
-        "(moved, directed && moved == Movement::Unknown)",
-        "(moved, moved == Movement::Unknown)",
+        "let interrupted = valid && directed && moved",
+        "let interrupted = valid && moved",
         OPEN_LOOP,
     ),
     fault(
@@ -117,9 +117,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "what was heard sets any frequency",
-        "instrument/src/step.rs",
-        "correction_rad_s = (correction_rad_s + off).bounded(self.oscillator.limit_rad_s());",
-        "correction_rad_s = correction_rad_s + off;",
+        "instrument/src/correction.rs",
+        "kept + beat.radians_per_window() * per_window_s,",
+        "return kept + beat.radians_per_window() * per_window_s,",
         JOINED,
     ),
     fault(

@@ -135,9 +135,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a tune leaves the phasor's frequency where the beat is silent",
-        "instrument/src/step.rs",
-        "let off = state.beat.radians_per_window() * self.per_window_s;",
-        "let off = state.beat.radians_per_window() * self.per_window_s * T::half();",
+        "instrument/src/correction.rs",
+        "kept + beat.radians_per_window() * per_window_s,",
+        "kept + beat.radians_per_window() * per_window_s * T::half(),",
         COMPOSITION,
     ),
     fault(
@@ -164,8 +164,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "drives at rest are those of before",
         "instrument/src/step.rs",
-        "        state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };\n        let mut",
-        "        let mut",
+        "        state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };\n        let limit_rad_s",
+        "        let limit_rad_s",
         COMPOSITION,
     ),
     fault(

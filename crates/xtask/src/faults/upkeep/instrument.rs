@@ -86,9 +86,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "at rest the oscillator goes back to its nominal frequency",
-        "instrument/src/step.rs",
-        "let mut correction_rad_s = state.lock.detuning_rad_s.bounded(self.oscillator.limit_rad_s());\n        match",
-        "let mut correction_rad_s = zero;\n        match",
+        "instrument/src/correction.rs",
+        "Orders::Run { .. } => return kept,",
+        "Orders::Run { .. } => return T::zero(),",
         JOINED,
     ),
     fault(
@@ -276,8 +276,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a sweep drives beside its own frequency",
         "instrument/src/step.rs",
-        "                correction_rad_s = swept;\n",
-        "",
+        "                state.drive = self.delay.undone(&forces, correction_rad_s);\n",
+        "                state.drive = self.delay.undone(&forces, correction_rad_s);\n                correction_rad_s = zero;\n",
         JOINED,
     ),
     fault(
@@ -318,8 +318,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "in single precision the moment has its delay twice",
         "instrument/src/delay.rs",
-        "drive.ahead(cos, -sin)",
-        "drive.ahead(cos, if core::mem::size_of::<T>() == 4 { sin } else { -sin })",
+        "drive.behind(cos, sin)",
+        "drive.behind(cos, if core::mem::size_of::<T>() == 4 { -sin } else { sin })",
         OPEN_LOOP,
     ),
     fault(
