@@ -202,7 +202,7 @@ pub(crate) fn report(
         angular_gain: finding.angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
-        unexplained: described(&effects, finding.hypothesis.angular_gain.abs(), of_a_table(&finding)),
+        unexplained: described(&effects, &finding),
         effects,
         heldout: errors.heldout(held),
         steps,
@@ -301,17 +301,30 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
     }
 }
 
-/// What could be done about a harmonic of the angle table.
-fn of_a_table(finding: &Finding<'_>) -> &'static str {
-    if finding.readout.is_some() {
-        "corrected as part of the angle table: what the two channels were found to have does not make it"
-    } else {
-        "corrected as part of the angle table; record the two channels, which tell offset, gain and skew from the rest"
+/// What is said of a harmonic of the angle table of a sensor with so many periods a turn; once a turn of the shaft its eccentricity
+/// shows, in the angle and not in the radius.
+fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64) -> &'static str {
+    let once_a_turn = n == Some(1) && (periods - 1.0).abs() < 1e-9;
+    match (finding.readout.is_some(), once_a_turn) {
+        (true, true) => {
+            "once a turn in the angle and not in the radius, where an offset of the channels would show: the eccentricity of a shaft or a \
+             mounting; corrected as part of the angle table, for as long as nothing is mounted anew"
+        }
+        (true, false) => {
+            "corrected as part of the angle table: what the two channels were found to have does not make it"
+        }
+        (false, true) => {
+            "corrected as part of the angle table; record the two channels, which tell their offsets from an eccentric shaft or mounting"
+        }
+        (false, false) => {
+            "corrected as part of the angle table; record the two channels, which tell offset, gain and skew from the rest"
+        }
     }
 }
 
 /// What was corrected without a known cause, of a sensor with so many periods a turn.
-fn described(effects: &[EffectReport], periods: f64, of_a_table: &str) -> Vec<Unexplained> {
+fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained> {
+    let periods = finding.hypothesis.angular_gain.abs();
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
@@ -332,7 +345,7 @@ fn described(effects: &[EffectReport], periods: f64, of_a_table: &str) -> Vec<Un
                     let seen = |p: &crate::report::ParameterReport| p.ci95.is_some_and(|i| i[0] > 0.0 || i[1] < 0.0);
                     if seen(c) || seen(s) {
                         let n = c.name.trim_start_matches("cos_").parse().ok();
-                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table);
+                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table(finding, n, periods));
                     }
                 }
             }
