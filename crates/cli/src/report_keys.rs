@@ -96,6 +96,10 @@ pub(crate) fn is_known(path: &str, written: &[EffectId]) -> bool {
 
 /// The place that a misspelt one is nearest to.
 pub(crate) fn nearest(path: &str, written: &[EffectId]) -> Option<String> {
+    let whole = format!("{path}.value");
+    if is_known(&whole, written) {
+        return Some(whole);
+    }
     let keys: Vec<&str> = path.split('.').collect();
     let all = places().into_iter().filter(|place| !place.starts_with("effects.*")).chain(of_effects(written));
     let named = all.map(|place| as_named(&place, &keys));
@@ -181,6 +185,7 @@ mod tests {
             ("effects.detection-cubic.parameters.kapa.value", "effects.detection-cubic.parameters.kappa.value"),
             ("scale_factor.nonlinearity_ppm.vale", "scale_factor.nonlinearity_ppm.value"),
             ("runs.rot+500.csv.spike", "runs.rot+500.csv.spikes"),
+            ("runs.hall-0.0003_0.csv.angular_gain", "runs.hall-0.0003_0.csv.angular_gain.value"),
             ("allan.bias_instability.value", "allan.bias_instability_dph.value"),
         ] {
             assert!(!is_known(path, &[]), "{path}");

@@ -23,7 +23,7 @@ const MOSTLY: f64 = 0.5;
 /// An angle that is off by more than this share of its period does not follow the reference.
 const LARGEST: f64 = 0.25;
 /// Harmonics of the angle that a readout makes: of offsets, of gain and skew, of cubics.
-const OF_A_READOUT: [usize; 3] = [1, 2, 4];
+pub(super) const OF_A_READOUT: [usize; 3] = [1, 2, 4];
 
 /// Whether every part of a readout shows in the radius of every run.
 pub(super) fn shows(readout: &Readout, runs: &[SensorRun]) -> bool {

@@ -21,6 +21,11 @@ const BETTER: f64 = 1.0;
 /// error to stations that were not seen, where none leaves the line's only (2.3 % by chance).
 const NO_ALIAS: f64 = 2.0;
 
+/// A mean square of the angle that is larger by no more than this factor is larger by a hair, 1 % of the rms; one of the radius
+/// below this share, half the rms, is far smaller: engineering choices.
+const A_HAIR: f64 = 1.02;
+const FAR_ROUNDER: f64 = 0.25;
+
 /// Standard errors that a simpler model may be worse by than the best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Tolerance {
@@ -231,14 +236,12 @@ pub(crate) struct Candidate<M> {
 }
 
 /// The simplest candidate that is as good as the best. A readout is also seen in the radius: of candidates that predict the
-/// angle alike, those remain that predict the radius as well as the best of them. Ties of size go to the library rather than to
+/// angle alike, those remain that predict the radius as well as the best of them. One that leaves far less of the radius may be a hair worse
+/// in the angle: else an eccentric shaft would be taken for an offset. Ties of size go to the library rather than to
 /// an effect as text, then to the smaller loss, and ties of that to the order of the models: the order in which they were tried has
 /// no say.
 pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) -> Option<&Candidate<M>> {
-    let by_loss = |a: &&Candidate<M>, b: &&Candidate<M>| {
-        a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
-    };
-    let best = candidates.iter().min_by(by_loss)?;
+    let best = best_by_angle(candidates)?;
     let by_angle: Vec<_> = candidates.iter().filter(|c| c.losses.is_as_good_as(&best.losses, tolerance)).collect();
     let radii = by_angle.iter().filter_map(|c| c.of_radius.as_ref());
     let roundest = radii.min_by(|a, b| a.total().total_cmp(&b.total()));
@@ -247,6 +250,21 @@ pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) 
         .copied()
         .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best, tolerance)))
         .min_by(|a, b| a.size.cmp(&b.size).then(a.texts.cmp(&b.texts)).then_with(|| by_loss(a, b)))
+}
+
+/// The candidate that predicts the angle best; one that leaves far less of the radius may be a hair worse.
+pub(crate) fn best_by_angle<M: Ord>(candidates: &[Candidate<M>]) -> Option<&Candidate<M>> {
+    let least = candidates.iter().min_by(|a, b| by_loss(a, b))?;
+    let rounder = |c: &&Candidate<M>| {
+        let radii = c.of_radius.as_ref().zip(least.of_radius.as_ref());
+        radii.is_some_and(|(own, other)| own.total() < FAR_ROUNDER * other.total())
+            && c.losses.total() <= A_HAIR * least.losses.total()
+    };
+    candidates.iter().filter(rounder).min_by(|a, b| by_loss(a, b)).or(Some(least))
+}
+
+fn by_loss<M: Ord>(a: &Candidate<M>, b: &Candidate<M>) -> std::cmp::Ordering {
+    a.losses.total().total_cmp(&b.losses.total()).then(a.size.cmp(&b.size)).then_with(|| a.model.cmp(&b.model))
 }
 
 #[cfg(test)]

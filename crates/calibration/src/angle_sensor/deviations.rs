@@ -3,6 +3,7 @@
 
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Parameter, Values};
 
+use super::circle::{OF_A_READOUT, ln_radius};
 use super::effects::{LIBRARY_VALUES, LibraryReadout};
 use super::model::{SensorModel, by_run};
 use super::readout::{Kind, Readout, Unknown};
@@ -10,6 +11,7 @@ use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
 use super::table_fit::TableFit;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
+use crate::numerics::linear::NormalEquations;
 
 /// Deviations from which on a parameter of an effect as text is no chance: by Student's t of 19 degrees of freedom 1 in 2,000.
 const NO_CHANCE: f64 = 4.2;
@@ -74,7 +76,8 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
     let order = model.table.table.cos.len();
     let mut held = held_by_table(model).to_vec();
     held.extend(of_texts_held_by_table(model, runs));
-    let others = [noise_model_difference(model, runs).to_vec(), weighting_difference(model, runs), held];
+    let in_radius = held_by_radius(model, runs).to_vec();
+    let others = [noise_model_difference(model, runs).to_vec(), weighting_difference(model, runs), held, in_radius];
     let beyond = |i: usize| {
         others.iter().fold(0.0, |sum: f64, other| sum.hypot(other.get(i).copied().unwrap_or(0.0))) / STUDENT_19
     };
@@ -158,17 +161,39 @@ fn of_texts_held_by_table(model: &SensorModel, runs: &[SensorRun]) -> Vec<f64> {
     readout.texts.iter().enumerate().flat_map(of_text).collect()
 }
 
-/// What a table beside the readout may hold of its parameters: offsets make a harmonic 1 of the angle, gain and skew a
-/// harmonic 2, cubics a harmonic 4 (and, of the channels' difference, a 2).
+/// What a table beside the readout may hold of its parameters.
 fn held_by_table(model: &SensorModel) -> [f64; 6] {
-    let Some(readout) = model.front().filter(|r| r.kind != Kind::Plain) else { return [0.0; 6] };
     let table = &model.table.table;
     let harmonic = |n: usize| {
         let [cos, sin] = [&table.cos, &table.sin].map(|v| v.get(n - 1).copied().unwrap_or(0.0));
         cos.hypot(sin)
     };
+    held_by(model, OF_A_READOUT.map(harmonic))
+}
+
+/// What the radius still holds of the parameters of a readout that the angle told: an eccentric shaft is in the angle as an offset
+/// is and not in the radius, and the difference is what the offset may be off by.
+fn held_by_radius(model: &SensorModel, runs: &[SensorRun]) -> [f64; 6] {
+    let Some(readout) = model.front() else { return [0.0; 6] };
+    let mut equations = NormalEquations::new(2 * OF_A_READOUT.len());
+    for run in runs {
+        let readings = run.channels().into_iter().flatten().filter(|z| !readout.rails.clips(**z));
+        for (z, left) in readings.zip(ln_radius(run, readout)) {
+            let theta = readout.angle(*z);
+            let row: Vec<f64> =
+                OF_A_READOUT.iter().flat_map(|n| <[f64; 2]>::from((*n as f64 * theta).sin_cos())).collect();
+            equations.add(&row, left);
+        }
+    }
+    let x = equations.solve();
+    held_by(model, std::array::from_fn(|i| x[2 * i].hypot(x[2 * i + 1])))
+}
+
+/// The parameters of a readout that make harmonics 1, 2 and 4 of this size, of the angle or of the logarithm of the radius: offsets
+/// make a harmonic 1, gain and skew a harmonic 2, cubics a harmonic 4 (and, of the channels' difference, a 2).
+fn held_by(model: &SensorModel, [first, second, fourth]: [f64; 3]) -> [f64; 6] {
+    let Some(readout) = model.front().filter(|r| r.kind != Kind::Plain) else { return [0.0; 6] };
     let LibraryReadout { gain_ratio, amplitude, .. } = LibraryReadout::from(readout);
-    let [first, second, fourth] = [1, 2, 4].map(harmonic);
     let cubic = |harmonic: f64| 16.0 / 3.0 * harmonic / amplitude.powi(2);
     [first * amplitude, first * amplitude, 2.0 * gain_ratio * second, 2.0 * second, cubic(fourth), cubic(second)]
 }

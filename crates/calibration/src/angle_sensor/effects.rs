@@ -95,7 +95,7 @@ impl Described<'_> {
     }
 
     /// The gain of θ over the reference, and its deviation: none where it is exact.
-    fn signed_gain(&self) -> (f64, f64) {
+    pub(super) fn signed_gain(&self) -> (f64, f64) {
         let shape = &self.model.table.shape;
         let at = shape.motion.size();
         if !shape.free_gain {

@@ -7,14 +7,17 @@ use super::deviations::{Deviations, deviations, own_gain_ratios};
 use super::effects::Described;
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
+use super::odd_runs::without_odd_runs;
 use super::rate_finding::rate_finding;
 use super::rate_runs;
 use super::readout::Kind;
-use super::report::{Errors, Finding, Head, report};
+use super::report::{ByItself, Errors, Finding, Head, report};
 use super::samples::{SensorRun, apart, prepare};
 use super::screening::believed;
 use super::sensor::other_unit;
+use super::sensor_alone::alone;
 use super::table_fit::Sample;
+use super::thermal::{Thermal, Told};
 use super::units::{of_the_angle, of_the_reference, require_degrees};
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
@@ -25,7 +28,7 @@ use crate::numerics::statistics::{median, span};
 use crate::recording::{Campaign, Instrument, Run, RunKind};
 use crate::report::gate::least_held_out;
 use crate::report::inference::{CONTRADICTS, covering};
-use crate::report::{Estimate, Share};
+use crate::report::{EffectReport, Estimate, Share};
 use cvg_model::effects::{EffectId, Stage};
 
 /// A campaign without a pattern: an angle sensor, or the integrated output of a rate gyroscope, whose angle goes round once
@@ -67,6 +70,7 @@ pub(crate) fn identify(
     with_plots: bool,
 ) -> Result<Identification, Refusal> {
     let rate_gyroscope = is_rate_gyroscope(&campaign);
+    require_an_angle(&campaign)?;
     let instrument = campaign.instrument;
     let stated = match campaign.pole_pairs {
         Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
@@ -74,6 +78,7 @@ pub(crate) fn identify(
     };
     let sense = campaign.angular_gain.map(f64::signum);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
+    let reference_c = campaign.temperature_c;
     let rates_alone = campaign.runs.iter().all(|run| run.recording.table_deg.is_none());
     // runs are known by their number among those about the input axis
     campaign.runs.sort_by_key(|run| run.kind == RunKind::CrossAxis);
@@ -92,9 +97,18 @@ pub(crate) fn identify(
     } else {
         believed(runs, stated, period, &mut left_out)?
     };
-    let (fitted, held) = apart(runs)?;
+    let (mut fitted, mut held) = apart(runs)?;
+    let mut thermal = None;
     if !rate_gyroscope {
         require_a_turn(&fitted, stated.unwrap_or(1.0), period)?;
+        match Thermal::told(&fitted, stated, period, reference_c) {
+            Told::Nothing => {}
+            Told::Open(why) => left_out.push(why),
+            Told::Slopes(told) => {
+                [&mut fitted, &mut held].into_iter().flatten().for_each(|run| *run = told.undone(run));
+                thermal = Some(told);
+            }
+        }
     }
     if held.iter().map(SensorRun::len).sum::<usize>() < least_held_out(instrument) {
         return Err(Refusal::no_answer(
@@ -108,7 +122,13 @@ pub(crate) fn identify(
     let mut finding = if rate_gyroscope {
         rate_finding(stated, period, &fitted, &held)?
     } else {
-        sensor_finding(stated, sense, period, [&fitted, &held], rates_alone, &texts)?
+        let all: Vec<usize> = fitted.iter().map(|run| run.number).collect();
+        let identify = |runs: &[SensorRun]| SensorModel::identify(stated, period, runs, &texts);
+        let model;
+        (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
+        held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
+        let asked = Asked { stated, sense, period, rates_alone };
+        sensor_finding(asked, model, thermal.as_ref(), [&fitted, &held], texts)?
     };
     finding.warnings.extend(left_out);
     finding.warnings.extend(why_not);
@@ -120,6 +140,19 @@ pub(crate) fn identify(
     })?;
     cross_axis::add(&mut identified.report, across)?;
     Ok(identified)
+}
+
+/// A rate that was summed drifts, which an angle sensor does not: it is a rate gyroscope's.
+fn require_an_angle(campaign: &Campaign) -> Result<(), Refusal> {
+    let summed = |run: &&Run| run.recording.theta_is_integral && run.recording.xc_v.is_none();
+    match campaign.runs.iter().find(summed).filter(|_| campaign.instrument == Instrument::Sensor) {
+        None => Ok(()),
+        Some(run) => Err(Refusal::no_answer(
+            &run.file.display().to_string(),
+            "theta_deg is the integral of a rate, and an angle sensor measures an angle",
+            "of a rate gyroscope a campaign.toml with period_deg = 360 in [campaign], and neither --sensor nor instrument = \"sensor\"",
+        )),
+    }
 }
 
 fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
@@ -148,7 +181,7 @@ fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
             &r.name,
             format!("theta_deg does not follow the reference, which turns through {:.0}°", r.travel_rad().to_degrees()),
             of_the_angle(r).unwrap_or_else(|| {
-                "the sensor's angle as theta_deg; of a rate in deg/s the integral is one: --map 'theta_deg=integral(COLUMN)'".into()
+                "the sensor's angle as theta_deg; of a rate gyroscope theta_deg = \"integral(COLUMN)\" in [columns] and period_deg = 360 in [campaign] of campaign.toml, without --sensor".into()
             }),
         )),
     }
@@ -207,13 +240,12 @@ fn competing(effects: &[EffectId], runs: &[SensorRun]) -> (Vec<EffectId>, Option
 /// The model of a sensor, with the deviations of its values. An effect as text that the intervals do not tell from its absence
 /// is none: the model is identified without it.
 fn identified(
-    stated: Option<f64>,
-    period: f64,
+    asked: Asked,
+    mut model: SensorModel,
     runs: &[SensorRun],
     mut texts: Vec<EffectId>,
 ) -> Result<(SensorModel, Deviations), Refusal> {
     loop {
-        let mut model = SensorModel::identify(stated, period, runs, &texts)?;
         let mut deviations = deviations(&model, &thinned(runs));
         let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
         if unsure.is_empty() {
@@ -221,18 +253,32 @@ fn identified(
             return Ok((model, deviations));
         }
         texts.retain(|id| !unsure.contains(id));
+        model = SensorModel::identify(asked.stated, asked.period, runs, &texts)?;
     }
 }
 
-fn sensor_finding(
+/// What a campaign says of its sensor.
+#[derive(Clone, Copy)]
+struct Asked {
+    /// its angular gain
     stated: Option<f64>,
+    /// the sign of that
     sense: Option<f64>,
+    /// period of its angle, rad
     period: f64,
-    [runs, held]: [&[SensorRun]; 2],
+    /// no run has an angle of the reference
     rates_alone: bool,
-    texts: &[EffectId],
+}
+
+fn sensor_finding(
+    asked: Asked,
+    model: SensorModel,
+    thermal: Option<&Thermal>,
+    [runs, held]: [&[SensorRun]; 2],
+    texts: Vec<EffectId>,
 ) -> Result<Finding<'static>, Refusal> {
-    let (model, deviations) = identified(stated, period, runs, texts.to_vec())?;
+    let Asked { stated, sense, period, rates_alone } = asked;
+    let (model, deviations) = identified(asked, model, runs, texts)?;
     require_following(runs, model.sensor.gain)?;
     let thinned = thinned(runs);
     let described = Described { model: &model, deviations: &deviations };
@@ -254,7 +300,17 @@ fn sensor_finding(
         warnings.push("detection_gain_ratio is null: no gain and skew were needed to predict the angle".into());
     }
     warnings.extend(on_a_circle);
-    let samples = model.sensor.samples(&thinned, declared.as_ref());
+    let thermal = thermal.filter(|_| !neutral);
+    warnings.extend(thermal.and_then(Thermal::said));
+    let recorded: Vec<SensorRun> = thinned.iter().map(SensorRun::as_recorded).collect();
+    let samples = model.sensor.samples(&recorded, declared.as_ref());
+    let mut hypothesis = described.hypothesis(stated);
+    let neutral_hypothesis = Hypothesis { members: Vec::new(), angle_table: None, clip: None, ..hypothesis.clone() };
+    if let Some(thermal) = thermal {
+        hypothesis.reference_c = Some(thermal.reference_c());
+        hypothesis.members.extend(thermal.members());
+        hypothesis.members.sort_by_key(|m| m.id);
+    }
     Ok(Finding {
         instrument: Instrument::Sensor,
         stated_gain: stated,
@@ -264,31 +320,34 @@ fn sensor_finding(
         }),
         angular_gain: described.angular_gain(stated),
         detection_gain_ratio: gain_ratio,
-        effects: described.effects(),
-        hypothesis: described.hypothesis(stated),
-        neutral_hypothesis: Hypothesis {
-            members: Vec::new(),
-            angle_table: None,
-            clip: None,
-            ..described.hypothesis(stated)
-        },
-        decomposition: take_apart(&samples, &thinned, model.sensor.cycles, model.sensor.gain),
+        effects: with_the_interval(described.effects(), all)
+            .into_iter()
+            .chain(thermal.into_iter().flat_map(Thermal::effects))
+            .collect(),
+        hypothesis,
+        neutral_hypothesis,
+        decomposition: take_apart(&samples, &recorded, model.sensor.cycles, model.sensor.gain),
         warnings,
         raw: raw_turns.then(|| -> Errors<'_> {
             let sensor = model.sensor;
-            Box::new(move |run| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect())
+            Box::new(move |run| sensor.samples(&[run.as_recorded()], None).iter().map(|s| s.error).collect())
         }),
         declared: {
             let sensor = model.sensor;
             Box::new(move |run| {
-                sensor.samples(std::slice::from_ref(run), declared.as_ref()).iter().map(|s| s.error).collect()
+                sensor.samples(&[run.as_recorded()], declared.as_ref()).iter().map(|s| s.error).collect()
             })
         },
         discovered: Box::new({
             let model = model.clone();
             move |run| model.left(run)
         }),
-        alone: None,
+        scale_factor: None,
+        bias: None,
+        alone: (!neutral).then(|| -> ByItself<'_> {
+            let (model, gain) = (model.clone(), described.signed_gain().0);
+            Box::new(move |run| alone(&model, gain, run))
+        }),
         readout: model.front().cloned(),
         direction: Box::new(move |run| {
             model.sensor.samples(std::slice::from_ref(run), model.front()).iter().map(|s| s.theta).collect()
@@ -319,6 +378,14 @@ fn or_exchanged(ratio: Estimate) -> Estimate {
         return ratio;
     }
     Estimate { ci95: [low.min(high.recip()), high.max(low.recip())], ..ratio }
+}
+
+/// Effects with the interval that the gain ratio of all runs has: that of the fit does not know where the runs disagree.
+fn with_the_interval(mut effects: Vec<EffectReport>, ratio: Option<Estimate>) -> Vec<EffectReport> {
+    let id = EffectId::DetectionGainMismatch.description().id;
+    let parameters = effects.iter_mut().filter(|e| e.id == id).flat_map(|e| &mut e.parameters);
+    parameters.for_each(|p| p.ci95 = ratio.map(|r| r.ci95).or(p.ci95));
+    effects
 }
 
 /// Says that a sensor counts the other way than the campaign states.

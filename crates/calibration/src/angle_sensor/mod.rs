@@ -14,6 +14,7 @@ mod jumps;
 pub(crate) mod likeness;
 mod lines;
 pub(crate) mod model;
+mod odd_runs;
 mod rails;
 mod rate_alone;
 mod rate_deviations;
@@ -29,7 +30,9 @@ mod samples;
 mod screening;
 mod selection;
 mod sensor;
+mod sensor_alone;
 mod table_fit;
+mod thermal;
 mod units;
 
 pub(crate) use identify::{identify, is_rate_gyroscope, serves};

@@ -104,6 +104,8 @@ mod tests {
                 rate_rad_s: t_s.clone(),
                 acceleration_rad_s2: t_s.clone(),
                 t_s,
+                temp_c: None,
+                recorded: None,
                 reading: Reading::Channels(readings),
             }
         };

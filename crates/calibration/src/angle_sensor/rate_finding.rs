@@ -9,10 +9,15 @@ use super::rate_regression::Term;
 use super::rate_runs;
 use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
+use crate::diagnostics::scale_factor::scale_factor;
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
+use crate::numerics::statistics::root_mean_square;
 use crate::recording::Instrument;
 use crate::report::{EffectReport, Estimate, ParameterReport};
+
+/// A response that moves the angle by less than this, rms, is not worth a word, rad: 0.0006°, an engineering choice.
+const LEAST_RESPONSE: f64 = 1e-5;
 
 /// Identifies a rate gyroscope from the runs to fit, and says what has to be said of it.
 ///
@@ -61,13 +66,18 @@ pub(super) fn rate_finding(
         effects: rate_effects(&model),
         hypothesis,
         neutral_hypothesis,
+        scale_factor: model
+            .answered
+            .then(|| scale_factor(&model.gains(&thinned), model.deviation(Term::Bias).to_degrees()))
+            .flatten(),
+        bias: model.answered.then(|| model.of_all(Term::Bias)).filter(|_| !model.bias_varies),
         decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
         warnings,
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
         alone: model.answered.then(|| -> ByItself<'_> {
-            let model = model.clone();
-            Box::new(move |run| model.alone(run))
+            let (model, runs) = (model.clone(), thinned.clone());
+            Box::new(move |run| model.alone(run, &runs))
         }),
         discovered: Box::new(move |run| model.left(run)),
         readout: None,
@@ -90,6 +100,14 @@ fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Res
         }
         warnings.push(format!("{what}: what is wrong stands as a bias, and the angular gain's interval says nothing; {wanted} separates them"));
     }
+    let furthest = runs.iter().map(|run| run.travel_rad()).fold(0.0, f64::max);
+    if furthest < std::f64::consts::TAU && model.gain.1.is_some() {
+        warnings.push(format!(
+            "the reference turns through {:.1}° only: were both rates in rad/s, their ratio would be right all the same and the bias \
+             in rad/s; deg/s is what their columns say",
+            furthest.to_degrees()
+        ));
+    }
     if let Some(lag) = model.lag_of_one_place {
         warnings.push(format!(
             "the angle and its reference part at one place only, where the rate changes, as a lag of {:.3} ms makes them: one place \
@@ -101,10 +119,16 @@ fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Res
         warnings
             .push("the bias differs from run to run as much as it is large: it is taken to be zero elsewhere".into());
     }
-    if let Some(time_constant_s) = model.time_constant_s() {
+    let moves = |response: f64| {
+        let of_run = |run: &SensorRun| response.abs() * root_mean_square(&run.acceleration_rad_s2);
+        runs.iter().map(of_run).fold(0.0, f64::max)
+    };
+    let shows = model.response.is_some_and(|response| moves(response) > LEAST_RESPONSE);
+    if let Some(time_constant_s) = model.time_constant_s().filter(|_| shows) {
         warnings.push(rate_runs::of_the_response(time_constant_s));
     }
-    let unexplained = |run| rate_runs::parting(run, &model.without_a_name(run));
+    // a bias and a scale factor of the run's own change nothing in its course
+    let unexplained = |run| rate_runs::parting(run, &model.beside_its_own(run, model.without_a_name(run)));
     warnings.extend(runs.iter().chain(held).filter_map(unexplained));
     Ok(warnings)
 }

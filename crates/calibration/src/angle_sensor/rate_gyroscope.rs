@@ -325,6 +325,8 @@ mod tests {
             commanded: false,
             rate_rad_s: t_s.iter().enumerate().map(|(i, &t)| rate(t) + digit(i)).collect(),
             acceleration_rad_s2: vec![0.0; t_s.len()],
+            temp_c: None,
+            recorded: None,
             reading: Reading::Angle(angle.collect()),
             reference_rad,
             t_s,

@@ -98,6 +98,11 @@ impl Stretch {
         variance(&self.rate).sqrt() > VARYING_RATE * fastest
     }
 
+    /// The same with another error.
+    pub(super) fn with_error(self, error: Vec<f64>) -> Self {
+        Self { error, ..self }
+    }
+
     /// The same with `values` of `terms` taken out of its error.
     pub(super) fn without(&self, terms: &[Term], values: &[f64]) -> Self {
         Self { error: self.left(terms, values), ..self.clone() }
@@ -224,6 +229,8 @@ mod tests {
             commanded: false,
             rate_rad_s: vec![0.0; error.len()],
             acceleration_rad_s2: vec![0.0; error.len()],
+            temp_c: None,
+            recorded: None,
             reading: Reading::Angle(t_s.iter().zip(error).map(|(t, e)| BIAS_RAD_S * t + e).collect()),
             reference_rad: vec![0.0; error.len()],
             t_s,

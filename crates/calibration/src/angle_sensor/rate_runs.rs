@@ -214,6 +214,8 @@ mod tests {
             reference_rad: sum(&rate),
             rate_rad_s: t_s.iter().map(|t| rate(*t)).collect(),
             acceleration_rad_s2: vec![0.0; t_s.len()],
+            temp_c: None,
+            recorded: None,
             reading: Reading::Angle(sum(&|t| (gain * rate(t) + 0.006).clamp(-range, range))),
             t_s,
         }

@@ -24,8 +24,8 @@ use crate::report::recorded::run_report;
 use crate::report::stages::stages;
 use crate::report::unexplained::residual_report;
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, Share, Status, StepReport, Temperature, Tool,
-    Unexplained,
+    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport,
+    Temperature, Tool, Unexplained,
 };
 
 /// Errors of a run at one stage, rad.
@@ -53,7 +53,11 @@ pub(crate) struct Finding<'a> {
     pub(crate) raw: Option<Errors<'a>>,
     pub(crate) declared: Errors<'a>,
     pub(crate) discovered: Errors<'a>,
-    /// what each run tells by itself, of a rate gyroscope that is answered
+    /// how the scale factor of a rate gyroscope goes with the rate
+    pub(crate) scale_factor: Option<ScaleFactor>,
+    /// the bias of all runs of a rate gyroscope, rad/s, where they share one
+    pub(crate) bias: Option<Estimate>,
+    /// what each run tells by itself, of what is answered
     pub(crate) alone: Option<ByItself<'a>>,
     /// the angle that the error is shown against
     pub(crate) direction: Errors<'a>,
@@ -99,6 +103,8 @@ impl Head {
 /// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
 /// a bias and a scale factor along, whatever they are, and are no test of either.
 const SAME_ERROR: f64 = 1e-3;
+/// A gain or a bias of a run's own that moves its angle by so many times what is left of it is not that of all runs.
+const ODD: f64 = 3.0;
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
 /// Reference steps below which differences of neighbours are noise, rad; and how near stations count as one, rad.
@@ -190,7 +196,7 @@ pub(crate) fn report(
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, discovered)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
     let plots = with_plots.then(|| plots(&names, raw.as_ref(), declared, discovered, &finding));
-    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered]);
+    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered], &mut warnings);
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -202,7 +208,7 @@ pub(crate) fn report(
         angular_gain: finding.angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
-        unexplained: described(&effects, finding.hypothesis.angular_gain.abs(), of_a_table(&finding)),
+        unexplained: described(&effects, &finding),
         effects,
         heldout: errors.heldout(held),
         steps,
@@ -211,7 +217,7 @@ pub(crate) fn report(
         runs: reported,
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
-        scale_factor: None,
+        scale_factor: finding.scale_factor,
         misalignment: Vec::new(),
         allan: None,
         temperature,
@@ -301,17 +307,30 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
     }
 }
 
-/// What could be done about a harmonic of the angle table.
-fn of_a_table(finding: &Finding<'_>) -> &'static str {
-    if finding.readout.is_some() {
-        "corrected as part of the angle table: what the two channels were found to have does not make it"
-    } else {
-        "corrected as part of the angle table; record the two channels, which tell offset, gain and skew from the rest"
+/// What is said of a harmonic of the angle table of a sensor with so many periods a turn; once a turn of the shaft its eccentricity
+/// shows, in the angle and not in the radius.
+fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64) -> &'static str {
+    let once_a_turn = n == Some(1) && (periods - 1.0).abs() < 1e-9;
+    match (finding.readout.is_some(), once_a_turn) {
+        (true, true) => {
+            "once a turn in the angle and not in the radius, where an offset of the channels would show: the eccentricity of a shaft or a \
+             mounting; corrected as part of the angle table, for as long as nothing is mounted anew"
+        }
+        (true, false) => {
+            "corrected as part of the angle table: what the two channels were found to have does not make it"
+        }
+        (false, true) => {
+            "corrected as part of the angle table; record the two channels, which tell their offsets from an eccentric shaft or mounting"
+        }
+        (false, false) => {
+            "corrected as part of the angle table; record the two channels, which tell offset, gain and skew from the rest"
+        }
     }
 }
 
 /// What was corrected without a known cause, of a sensor with so many periods a turn.
-fn described(effects: &[EffectReport], periods: f64, of_a_table: &str) -> Vec<Unexplained> {
+fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained> {
+    let periods = finding.hypothesis.angular_gain.abs();
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
@@ -332,7 +351,7 @@ fn described(effects: &[EffectReport], periods: f64, of_a_table: &str) -> Vec<Un
                     let seen = |p: &crate::report::ParameterReport| p.ci95.is_some_and(|i| i[0] > 0.0 || i[1] < 0.0);
                     if seen(c) || seen(s) {
                         let n = c.name.trim_start_matches("cos_").parse().ok();
-                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table);
+                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table(finding, n, periods));
                     }
                 }
             }
@@ -364,6 +383,7 @@ fn runs(
     finding: &Finding<'_>,
     [fitted, held]: [&[SensorRun]; 2],
     [on_fit, after]: [&Evaluation; 2],
+    warnings: &mut Vec<String>,
 ) -> (Vec<RunReport>, Option<Temperature>) {
     let mut out = head.runs.clone();
     let mut steady = vec![None; out.len()];
@@ -379,7 +399,7 @@ fn runs(
         r.rms_deg = Some(own.size().rms_deg);
         let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
         if is_fit || !shared {
-            tell(r, run, finding, kept);
+            warnings.extend(tell(r, run, finding, kept));
             let speed = run.rate_rad_s.iter().map(|w| w.abs()).sum::<f64>() / run.len() as f64;
             steady[run.number] = Some(rate).filter(|r| r.abs() > ONE_WAY * speed.to_degrees());
         }
@@ -394,24 +414,51 @@ fn runs(
     for (_, r) in out.iter_mut().enumerate().filter(|(number, r)| turned(r) && !used(*number)) {
         (r.r#use, r.agrees) = ("left out".into(), Some(false));
     }
-    let seen: Vec<Seen> =
-        out.iter().zip(steady).filter_map(|(r, steady)| Some(Seen::of(r, steady, r.temp_c?))).collect();
+    // a sensor has neither a scale factor nor a bias that could go with the temperature
+    let of_rates = finding.instrument == Instrument::Gyroscope;
+    let see = |(r, steady): (&RunReport, Option<f64>)| {
+        let seen = Seen::of(r, steady.filter(|_| of_rates), r.temp_c?);
+        Some(if of_rates { seen } else { Seen { gain: None, bias_dps: None, ..seen } })
+    };
+    let seen: Vec<Seen> = out.iter().zip(steady).filter_map(see).collect();
     let temperature = temperature(&seen, finding.hypothesis.sense());
     (out, temperature)
 }
 
-/// Gain and bias of a rate gyroscope as one run alone tells them; the gain ratio of channels beside a temperature.
-fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]) {
+/// Gain and bias as one run alone tells them, and the gain ratio of channels beside a temperature; says where they are not those of all
+/// runs.
+fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]) -> Vec<String> {
     if r.temp_c.is_some() && run.channels().is_some() {
-        r.detection_gain_ratio = super::ellipse::gain_ratio(run);
+        r.detection_gain_ratio = super::ellipse::gain_ratio(&run.as_recorded());
     }
     let rows: Vec<usize> = (0..run.len()).filter(|&i| kept[i]).collect();
-    let Some(alone) = finding.alone.as_ref().and_then(|alone| alone(&run.subset(&rows))) else { return };
+    let Some(alone) = finding.alone.as_ref().and_then(|alone| alone(&run.subset(&rows))) else { return Vec::new() };
     let Estimate { value, ci95: [low, high] } = alone.gain;
     // the sign by which the campaign counts
     let counts_alike = value * finding.hypothesis.angular_gain >= 0.0;
-    r.angular_gain = Some(if counts_alike { alone.gain } else { Estimate { value: -value, ci95: [-high, -low] } });
-    r.bias_dps = Some(Estimate { value: alone.bias.value.to_degrees(), ci95: alone.bias.ci95.map(f64::to_degrees) });
+    let gain = if counts_alike { alone.gain } else { Estimate { value: -value, ci95: [-high, -low] } };
+    r.angular_gain = Some(gain);
+    let in_degrees = |e: Estimate| Estimate { value: e.value.to_degrees(), ci95: e.ci95.map(f64::to_degrees) };
+    let bias = in_degrees(alone.bias);
+    r.bias_dps = Some(bias);
+    let (turned, seconds) = (run.travel_rad().to_degrees(), run.t_s[run.len() - 1] - run.t_s[0]);
+    let usual = r.rms_deg.unwrap_or(0.0);
+    let odd = |own: &Estimate, all: &Estimate, over: f64| {
+        let off = (own.value - all.value).abs();
+        off > own.half_width() + all.half_width() && off * over > ODD * usual
+    };
+    // a scale factor that goes with the rate is said to, and runs at other rates do not contradict it
+    let of_gain = (finding.scale_factor.is_none() && odd(&gain, &finding.angular_gain, turned)).then(|| {
+        format!(
+            "{}: its angular gain is {:.5}, that of all runs {:.5}",
+            run.name, gain.value, finding.angular_gain.value
+        )
+    });
+    let of_bias = finding.bias.map(in_degrees).filter(|all| odd(&bias, all, seconds)).map(|all| {
+        format!("{}: its bias is {:.5} deg/s, that of all runs {:.5} deg/s", run.name, bias.value, all.value)
+    });
+    r.agrees = Some(of_gain.is_none() && of_bias.is_none());
+    of_gain.into_iter().chain(of_bias).collect()
 }
 
 fn curves(

@@ -37,6 +37,10 @@ pub(crate) struct SensorRun {
     pub(crate) acceleration_rad_s2: Vec<f64>,
     /// what the instrument read
     pub(crate) reading: Reading,
+    /// its temperature, °C, where it was recorded
+    pub(crate) temp_c: Option<Vec<f64>>,
+    /// the channels as recorded, where `reading` has been taken to another temperature
+    pub(crate) recorded: Option<Vec<[f64; 2]>>,
 }
 
 /// Share of a run, in time, that is fitted where no run is held out.
@@ -76,6 +80,8 @@ impl SensorRun {
             rate_rad_s,
             acceleration_rad_s2,
             reading,
+            temp_c: r.temp_c.map(|temp| temp[settled].to_vec()),
+            recorded: None,
         })
     }
 
@@ -102,6 +108,8 @@ impl SensorRun {
             rate_rad_s: still.clone(),
             acceleration_rad_s2: still,
             reading: Reading::Channels(settled.map(|i| [x[i], y[i]]).collect()),
+            temp_c: None,
+            recorded: None,
         })
     }
 
@@ -123,8 +131,16 @@ impl SensorRun {
                 Reading::Angle(theta) => Reading::Angle(pick(theta)),
                 Reading::Channels(v) => Reading::Channels(kept.iter().map(|&i| v[i]).collect()),
             },
+            temp_c: self.temp_c.as_deref().map(pick),
+            recorded: self.recorded.as_ref().map(|v| kept.iter().map(|&i| v[i]).collect()),
             ..*self
         }
+    }
+
+    /// The run with its channels as recorded.
+    pub(crate) fn as_recorded(&self) -> Self {
+        let reading = self.recorded.clone().map_or_else(|| self.reading.clone(), Reading::Channels);
+        Self { reading, recorded: None, ..self.clone() }
     }
 
     /// Every `stride`-th row.

@@ -166,6 +166,8 @@ mod tests {
             t_s: (0..2000).map(f64::from).collect(),
             rate_rad_s: vec![0.01; 2000],
             acceleration_rad_s2: vec![0.0; 2000],
+            temp_c: None,
+            recorded: None,
             reading: Reading::Channels(
                 reference_rad.iter().map(|a| [0.2 + (gain * a + 0.3).cos(), 1.0132 * (gain * a + 0.3).sin()]).collect(),
             ),

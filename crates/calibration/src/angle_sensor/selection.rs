@@ -7,7 +7,9 @@ use cvg_model::effects::EffectId;
 use rayon::prelude::*;
 
 use super::circle;
-use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, cross_validate, losses_of_radius};
+use super::cross_validation::{
+    Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, losses_of_radius,
+};
 use super::ellipse;
 use super::lines::strongest_and_its_aliases;
 use super::rails::Rails;
@@ -137,8 +139,9 @@ impl<'a> Selection<'a> {
         self.runs.iter().all(|r| matches!(r.reading, Reading::Channels(_)))
     }
 
-    /// Every readout with every weighting, without a table and beside one; the best few kinds remain, each with the
-    /// weighting that predicts best. Those with effects as text are chosen among themselves, so that they take no other's place.
+    /// Every readout with every weighting, without a table and beside one; the best few kinds remain, each with the weighting that
+    /// predicts the angle best, and one that leaves far less of the radius. Those with effects as text are chosen
+    /// among themselves, so that they take no other's place.
     fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Vec<Option<Front>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
         let mut fronts = vec![Some(PLAIN)];
@@ -146,20 +149,26 @@ impl<'a> Selection<'a> {
             fronts.extend(self.fitted_fronts().into_iter().map(Some));
         }
         let first = self.offer(&fronts, &coarse);
-        type Sort<'a> = Option<(Kind, &'a [EffectId])>;
-        let mut best: BTreeMap<Sort<'_>, (f64, &Option<Front>)> = BTreeMap::new();
+        type Sort = Option<(Kind, Vec<EffectId>)>;
+        let mut kinds: BTreeMap<Sort, Vec<Candidate<Model>>> = BTreeMap::new();
         for c in &first {
-            let key = c.model.0.as_ref().map(|(kind, _, texts)| (*kind, texts.as_slice()));
-            let least = best.entry(key).or_insert((f64::INFINITY, &c.model.0));
-            if c.losses.rms() < least.0 {
-                *least = (c.losses.rms(), &c.model.0);
-            }
+            let key = c.model.0.as_ref().map(|(kind, _, texts)| (*kind, texts.clone()));
+            kinds.entry(key).or_default().push(c.clone());
         }
-        let mut ranked: Vec<_> = best.into_values().collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
-        let (plain, texts): (Vec<_>, Vec<_>) = ranked.into_iter().partition(|(_, front)| texts_of(front).is_empty());
+        let least = |c: &[Candidate<Model>]| {
+            let by_angle = |a: &&Candidate<Model>, b: &&Candidate<Model>| {
+                a.losses.rms().total_cmp(&b.losses.rms()).then_with(|| a.model.cmp(&b.model))
+            };
+            c.iter().min_by(by_angle).map(|c| (c.losses.rms(), c.model.0.clone()))
+        };
+        let mut ranked: Vec<_> =
+            kinds.into_values().filter_map(|c| Some((least(&c)?, best_by_angle(&c)?.model.0.clone()))).collect();
+        ranked.sort_by(|((a, a_front), _), ((b, b_front), _)| a.total_cmp(b).then_with(|| a_front.cmp(b_front)));
+        let (plain, texts): (Vec<_>, Vec<_>) =
+            ranked.into_iter().partition(|((_, front), _)| texts_of(front).is_empty());
         let finalists = plain.into_iter().take(FINALISTS).chain(texts.into_iter().take(FINALISTS));
-        let finalists: Vec<_> = finalists.map(|(_, front)| front.clone()).collect();
+        let mut finalists: Vec<_> = finalists.flat_map(|((_, front), chosen)| [front, chosen]).collect();
+        finalists.dedup();
         pool.extend(first.into_iter().filter(|c| !finalists.contains(&c.model.0)));
         finalists
     }

@@ -294,6 +294,8 @@ mod tests {
             reference_rad,
             rate_rad_s: none.clone(),
             acceleration_rad_s2: none,
+            temp_c: None,
+            recorded: None,
             reading: Reading::Angle(theta),
         }]
     }

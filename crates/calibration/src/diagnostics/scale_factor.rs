@@ -108,13 +108,14 @@ fn slope(segments: &[Residual]) -> Option<(f64, f64)> {
 }
 
 /// Nonlinearity and asymmetry from rates and gains, where three rates or more and both senses are there.
-pub(crate) fn scale_factor(gains: &[(f64, Estimate)]) -> Option<ScaleFactor> {
+/// `bias_dps` is what a bias common to all runs is believed to be, standard deviation, deg/s; no less than the Earth's rate.
+pub(crate) fn scale_factor(gains: &[(f64, Estimate)], bias_dps: f64) -> Option<ScaleFactor> {
     let told: Vec<(f64, Estimate)> =
         gains.iter().copied().filter(|(rate, gain)| rate.abs() > 0.0 && gain.half_width() > 0.0).collect();
     let [slowest, fastest] = range_of_rates(told.iter().map(|t| t.0))?;
     let range = 1.0 - slowest / fastest;
     let mean = told.iter().map(|t| t.1.value).sum::<f64>() / told.len() as f64;
-    let prior = [VAGUE, VAGUE, VAGUE, BIAS_DPS].map(|s| (s * mean).powi(-2));
+    let prior = [VAGUE, VAGUE, VAGUE, bias_dps.max(BIAS_DPS)].map(|s| (s * mean).powi(-2));
     let mut information = Matrix4::from_diagonal(&Vector4::from(prior));
     let mut right = Vector4::zeros();
     let row = |rate: f64| Vector4::new(1.0, rate.abs() / fastest, rate.signum(), 1.0 / rate);
@@ -167,7 +168,7 @@ mod tests {
                 run(rate, k * (1.0 + 1e-6 * ppm) + bias / rate, 1e-6)
             })
             .into();
-        let s = scale_factor(&runs).expect("six rates");
+        let s = scale_factor(&runs, 0.0).expect("six rates");
         assert!((s.nonlinearity_ppm.value - 200.0).abs() < 4.0, "{s:?}");
         assert!((s.asymmetry_ppm.value - 50.0).abs() < 4.0, "{s:?}");
         assert!(s.nonlinearity_ppm.half_width() < 10.0, "{s:?}");
@@ -176,10 +177,10 @@ mod tests {
     #[test]
     fn three_rates_leave_a_bias_of_the_earths_rate_open() {
         let runs: Vec<(f64, Estimate)> = [-300.0, 100.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
-        let s = scale_factor(&runs).expect("three rates");
+        let s = scale_factor(&runs, 0.0).expect("three rates");
         assert!(s.nonlinearity_ppm.value.abs() < 1e-6 && s.nonlinearity_ppm.half_width() > 20.0, "{s:?}");
-        assert_eq!(scale_factor(&runs[1..]), None);
+        assert_eq!(scale_factor(&runs[1..], 0.0), None);
         let one_way: Vec<(f64, Estimate)> = [100.0, 300.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
-        assert_eq!(scale_factor(&one_way), None);
+        assert_eq!(scale_factor(&one_way, 0.0), None);
     }
 }

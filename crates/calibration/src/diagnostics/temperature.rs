@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use crate::facts::{Estimate, RunReport, Temperature};
 
 /// Temperatures within a span of this tell nothing, K: engineering choice, ten times the accuracy of a usual sensor of them.
-const LEAST_SPAN_K: f64 = 2.0;
+pub(crate) const LEAST_SPAN_K: f64 = 2.0;
 /// Where temperature and rate are correlated so closely, what one does is not told from what the other does.
 const TOGETHER: f64 = 0.9;
 /// The share of the other columns in a column below which it is one of its own.
@@ -135,7 +135,7 @@ fn together(steady: &[(f64, f64, f64)]) -> Option<&'static str> {
 
 /// Least squares, each value with Student's 95 % interval from the scatter about the fit; `None` where the rows are too few
 /// or do not tell the columns apart.
-fn slopes(rows: &[(Vec<f64>, f64)]) -> Option<Vec<Estimate>> {
+pub(crate) fn slopes(rows: &[(Vec<f64>, f64)]) -> Option<Vec<Estimate>> {
     let (n, columns) = (rows.len(), rows.first()?.0.len());
     let spare = n.checked_sub(columns).filter(|s| *s > 0)?;
     let x = DMatrix::from_fn(n, columns, |i, j| rows[i].0[j]);

@@ -55,6 +55,15 @@ pub(crate) fn line(x: &[f64], y: &[f64]) -> (f64, f64) {
     (slope, my - slope * mx)
 }
 
+/// Correlation of two series; 0 where one stands still.
+pub(crate) fn correlation(x: &[f64], y: &[f64]) -> f64 {
+    let n = x.len().min(y.len()).max(1) as f64;
+    let (mx, my) = x.iter().zip(y).fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let moments = x.iter().zip(y).map(|(x, y)| (x - mx, y - my));
+    let (xx, yy, xy) = moments.fold((0.0, 0.0, 0.0), |(xx, yy, xy), (x, y)| (xx + x * x, yy + y * y, xy + x * y));
+    if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+}
+
 /// Mean direction of angles of a period.
 pub(crate) fn circular_mean(angles: impl Iterator<Item = f64>, period: f64) -> f64 {
     let k = std::f64::consts::TAU / period;

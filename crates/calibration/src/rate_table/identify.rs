@@ -60,7 +60,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
-    let scale_factor = scale_factor(&gains(&mut dataset, &fitted));
+    let scale_factor = scale_factor(&gains(&mut dataset, &fitted), 0.0);
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let steps = steps.into_iter().map(|step| step.read(&dataset)).collect();

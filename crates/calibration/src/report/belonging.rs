@@ -35,6 +35,9 @@ const SHARE: f64 = 0.1;
 const LARGEST_DRIFT_RAD_S: f64 = 0.087;
 /// Offset and unequal gains of the calibrated sensor leave less than this share of its radius.
 const LARGEST_LEFT_IN_THE_RADIUS: f64 = 0.02;
+/// A calibration that leaves less than this share with the sign of the angle turned is of an angle that counts the other way:
+/// engineering choice.
+const MIRRORED: f64 = 0.5;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
 
@@ -67,6 +70,16 @@ pub(crate) fn require_of_the_calibrated(
             return refuse(problem, unit(own, Some(calibrated)).filter(|_| own * calibrated > 0.0));
         }
         let [before, after] = [0, 1].map(|i| angle_error(rows, gain, h.period_rad, i).to_degrees());
+        if let Some(rows) = counted_the_other_way(h, recording, rows) {
+            let other = angle_error(&rows, gain, h.period_rad, 1).to_degrees();
+            if other < MIRRORED * after {
+                let problem = format!(
+                    "its angle counts the other way than the calibrated one: with the calibration undone it is off by {after:.4}°, and \
+                     with its sign turned before that by {other:.4}°"
+                );
+                return refuse(problem, Some("--map 'theta_deg=-theta_deg'"));
+            }
+        }
         if after > WORSE * before {
             let problem =
                 format!("with the calibration undone its angle is off by {after:.4}°, as recorded by {before:.4}°");
@@ -83,6 +96,39 @@ pub(crate) fn require_of_the_calibrated(
         }
     }
     Ok(())
+}
+
+/// The rows as they would be if an angle that is recorded as such counted the other way than the calibrated one, whose table then
+/// stands the other way round.
+fn counted_the_other_way(h: &Hypothesis, recording: &Recording, rows: &[Row]) -> Option<Vec<Row>> {
+    let table = h.angle_table.as_ref().filter(|_| recording.xc_v.is_none() && h.instrument == Instrument::Sensor)?;
+    let cycles = std::f64::consts::TAU / h.period_rad;
+    let turned = |r: &Row| Row { angle_rad: [r.angle_rad[0], -table.undo(-r.angle_rad[0], cycles)], ..*r };
+    Some(rows.iter().map(turned).collect())
+}
+
+/// What is said of a recording without a reference whose angle counts the other way than the calibrated one: a table that stands
+/// the other way round leaves it less smooth than with its sign turned.
+pub(crate) fn counts_the_other_way(h: &Hypothesis, recording: &Recording, rows: &[Row]) -> Option<String> {
+    if recording.table_deg.is_some() || recording.rate_dps.is_some() || !goes_round(rows, h.period_rad) {
+        return None;
+    }
+    let turned = counted_the_other_way(h, recording, rows)?;
+    let [as_it_is, other] = [rows, &turned].map(|rows| roughness(rows, h.period_rad));
+    (other < MIRRORED * as_it_is).then(|| {
+        "its angle seems to count the other way than the calibrated one: with its sign turned the calibration leaves it far smoother; \
+         --map 'theta_deg=-theta_deg' turns it"
+            .into()
+    })
+}
+
+/// How much the compensated angle is off what stands a radian of it before and behind, in the mean of the two, robust.
+fn roughness(rows: &[Row], period: f64) -> f64 {
+    let angle = unwrapped(rows.iter().map(|r| r.angle_rad[1]), period);
+    let step = median(&mut angle.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>());
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
+    let apart = ((1.0 / step.max(1e-9)) as usize).clamp(1, (angle.len() - 1) / 2);
+    robust_deviation((apart..angle.len() - apart).map(|i| angle[i] - 0.5 * (angle[i - apart] + angle[i + apart])))
 }
 
 /// What a sensor's radius still does with its angle although its readout is undone, in words; none where that is little.

@@ -10,7 +10,7 @@ use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
 use crate::numerics::angles::wrapped;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
-use crate::report::belonging::{Row, left_in_the_radius, require_of_the_calibrated};
+use crate::report::belonging::{Row, counts_the_other_way, left_in_the_radius, require_of_the_calibrated};
 use crate::report::calibration::Calibration;
 use crate::report::provenance::amplitude;
 
@@ -98,6 +98,9 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     require_of_the_calibrated(calibration, recording, &rows)?;
     if let Some(left) = left_in_the_radius(h, &rows).filter(|_| channels) {
         out.warnings.push(format!("{}: {left}", recording.source.display()));
+    }
+    if let Some(said) = counts_the_other_way(h, recording, &rows) {
+        out.warnings.push(format!("{}: {said}", recording.source.display()));
     }
     if channels && recording.theta_deg.is_none() {
         let mut last = angle_rad.first().copied().unwrap_or(0.0);

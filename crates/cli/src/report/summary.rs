@@ -38,10 +38,26 @@ pub(crate) fn summary(identified: &Identification) -> String {
     for Number { name, value, unit } in further(r) {
         line(format!("  {name:<27} {} {unit}", estimated(&value)));
     }
+    for (name, said) in over_temperature(r) {
+        line(format!("  {name:<27} {said}"));
+    }
     for w in &r.warnings {
         line(format!("  warning: {w}"));
     }
     s
+}
+
+/// How what runs tell goes with their temperatures, and why that is not told.
+fn over_temperature(r: &Report) -> Vec<(&'static str, String)> {
+    let Some(t) = &r.temperature else { return Vec::new() };
+    let slopes = [
+        ("gain over temperature", t.angular_gain_per_k, "1/K"),
+        ("bias over temperature", t.bias_dps_per_k, "deg/s/K"),
+        ("gain of Y over X, over temp.", t.detection_gain_ratio_per_k, "1/K"),
+    ];
+    let told =
+        slopes.into_iter().filter_map(|(name, slope, unit)| Some((name, format!("{} {unit}", estimated(&slope?)))));
+    told.chain(t.reason.iter().map(|why| ("over temperature", why.clone()))).collect()
 }
 
 /// The gains that an instrument of this kind has, by the names that they have there.

@@ -232,10 +232,13 @@ fn understand(
         candidates(told).max_by_key(|&separator| (known(text, separator, naming), fields(separator))).unwrap_or(b',');
     let Some(record) = split(text, separator).filter(|_| text.iter().filter(|&&byte| byte == b'"').count() % 2 == 0)
     else {
-        return refuse(
-            "the header has a quote that is not closed".to_owned(),
-            "names without line breaks, quotes in pairs",
-        );
+        let as_a_unit = [&b"[\"]"[..], b"(\")"].iter().any(|unit| text.windows(3).any(|part| part == *unit));
+        let wanted = if as_a_unit {
+            "arc seconds as [arcsec] or [″]: a quote opens a name, which has to be closed"
+        } else {
+            "names without line breaks, quotes in pairs"
+        };
+        return refuse("the header has a quote that is not closed".to_owned(), wanted);
     };
     let mut names: Vec<String> = record.fields().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
     // LabVIEW may write the times once more beside each column

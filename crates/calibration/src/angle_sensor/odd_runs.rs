@@ -1,0 +1,100 @@
+//! A run of an angle sensor that does not fit what the others say: what the others show, undone, leaves it far worse than them. It is
+//! left out and named, with what is odd about it.
+
+use super::ellipse;
+use super::model::SensorModel;
+use super::samples::SensorRun;
+use crate::error::Refusal;
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::{median, root_mean_square};
+
+/// Runs from which on one can be odd, and the share of them that may be left out.
+const FEWEST_RUNS: usize = 3;
+const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
+/// A run that leaves so many times what the others do is looked at …
+const SUSPECT: f64 = 1.5;
+/// … and is odd where the model of the others leaves this many times as much of it as of the worst of them: engineering choice.
+const ODD: f64 = 5.0;
+/// A cause is named where it is most of what is left: without it less than this share remains, rms.
+const MOSTLY: f64 = 0.5;
+/// Gain ratios that differ by less are one.
+const SAME_RATIO: f64 = 2e-3;
+
+/// The runs that fit one sensor, and its model.
+///
+/// # Errors
+/// Where no model can be identified.
+pub(super) fn without_odd_runs(
+    mut runs: Vec<SensorRun>,
+    identify: impl Fn(&[SensorRun]) -> Result<SensorModel, Refusal>,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<SensorRun>, SensorModel), Refusal> {
+    let mut model = identify(&runs)?;
+    let most = (MOST_LEFT_OUT * runs.len() as f64).floor();
+    let mut left_out = 0.0;
+    while runs.len() >= FEWEST_RUNS && left_out < most && !model.by_radius {
+        let left: Vec<f64> = runs.iter().map(|r| root_mean_square(&model.left(r))).collect();
+        let Some(worst) = (0..runs.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { break };
+        let rest: Vec<SensorRun> =
+            runs.iter().enumerate().filter(|(i, _)| *i != worst).map(|(_, run)| run.clone()).collect();
+        let mut others: Vec<f64> = (0..runs.len()).filter(|i| *i != worst).map(|i| left[i]).collect();
+        if left[worst] <= SUSPECT * median(&mut others) {
+            break;
+        }
+        let Ok(of_rest) = identify(&rest) else { break };
+        let own = root_mean_square(&of_rest.left(&runs[worst]));
+        let theirs = rest.iter().map(|r| root_mean_square(&of_rest.left(r))).fold(0.0, f64::max);
+        if own <= ODD * theirs {
+            break;
+        }
+        warnings.push(format!(
+            "{}: left out: with what the other runs show undone its angle is off by {:.4}°, theirs by {:.4}° at most{}",
+            runs[worst].name,
+            own.to_degrees(),
+            theirs.to_degrees(),
+            cause(&of_rest, &runs[worst], &rest).map_or(String::new(), |cause| format!("; {cause}"))
+        ));
+        (runs, model) = (rest, of_rest);
+        left_out += 1.0;
+    }
+    Ok((runs, model))
+}
+
+/// What is odd about a run, where that is one thing.
+fn cause(model: &SensorModel, run: &SensorRun, others: &[SensorRun]) -> Option<String> {
+    let left = model.left(run);
+    let most = |beside: f64| beside < MOSTLY * root_mean_square(&left);
+    let gain = model.sensor.gain;
+    let (beside, [_, slope]) = regressed(run, &left, |a| [1.0, a]);
+    if most(beside) {
+        return Some(format!(
+            "it turns {:.4} times as far as its reference, the others {:.4} times",
+            (gain + slope).abs(),
+            gain.abs()
+        ));
+    }
+    let own = ellipse::gain_ratio(run)?;
+    let mut ratios: Vec<f64> = others.iter().filter_map(ellipse::gain_ratio).collect();
+    let ratio = median(&mut ratios);
+    if (own / ratio - 1.0).abs() > SAME_RATIO {
+        return Some(format!("its gain of Y over X is {own:.4} by itself, that of the others {ratio:.4}"));
+    }
+    let (beside, [_, _, cosine, sine]) = regressed(run, &left, |a| [1.0, a, a.cos(), a.sin()]);
+    most(beside).then(|| {
+        format!(
+            "most of it is {:.3}° of the shaft, once a turn, as of an eccentric mounting",
+            (cosine.hypot(sine) / gain.abs()).to_degrees()
+        )
+    })
+}
+
+/// What is left of an error, rms, beside these functions of the reference, and their coefficients.
+fn regressed<const N: usize>(run: &SensorRun, left: &[f64], row: impl Fn(f64) -> [f64; N]) -> (f64, [f64; N]) {
+    let first = run.reference_rad.first().copied().unwrap_or(0.0);
+    let rows = || run.reference_rad.iter().map(|a| row(a - first)).zip(left);
+    let mut equations = NormalEquations::new(N);
+    rows().for_each(|(row, e)| equations.add(&row, *e));
+    let x = equations.solve();
+    let rest: Vec<f64> = rows().map(|(row, e)| e - row.iter().zip(&x).map(|(r, x)| r * x).sum::<f64>()).collect();
+    (root_mean_square(&rest), std::array::from_fn(|i| x[i]))
+}

@@ -1,0 +1,44 @@
+//! A rate gyroscope whose scale factor goes with the rate: by how much is told, and what single runs tell holds what was planted.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::recording::{Campaign, Instrument, Recording, Role, Run};
+use cvg_calibration::report::Estimate;
+use cvg_tests::angle_sensor::{Noise, identified, run, sensor};
+
+const BIAS_DPS: f64 = 0.2;
+
+/// 20 s at a steady rate, 200 samples/s, whose scale factor is k there.
+fn steady(rate_dps: f64, k: f64, seed: u64) -> Run {
+    let (mut noise, dt, mut theta) = (Noise::new(seed), 0.005, 0.0);
+    let t_s: Vec<f64> = (0..4000).map(|i| dt * f64::from(i)).collect();
+    let read = |_: &f64| {
+        theta += (k * rate_dps + BIAS_DPS + 0.002 * noise.sample()) * dt;
+        theta
+    };
+    let theta_deg = Some(t_s.iter().map(read).collect());
+    let table_deg = Some(t_s.iter().map(|t| rate_dps * t).collect());
+    let recording = Recording { t_s, table_deg, theta_deg, ..Recording::default() };
+    run(&format!("{rate_dps}.csv"), Role::Fit, recording)
+}
+
+#[test]
+fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed_for_it() {
+    for ppm in [0.0, 200.0] {
+        let of = |rate: f64| 1.0 + 1e-6 * ppm * (rate.abs() - 50.0) / 150.0;
+        let rates = [50.0, -50.0, 100.0, -100.0, 200.0, -200.0];
+        let runs = rates.iter().enumerate().map(|(n, rate)| steady(*rate, of(*rate), n as u64)).collect();
+        let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
+        let report = identified(campaign).report;
+        let holds = |e: Estimate, planted: f64| e.ci95[0] <= planted && planted <= e.ci95[1];
+        let scale = report.scale_factor.unwrap();
+        assert!(holds(scale.nonlinearity_ppm, ppm) && scale.nonlinearity_ppm.half_width() < 20.0, "{scale:?}");
+        assert!(holds(scale.asymmetry_ppm, 0.0), "{scale:?}");
+        for (r, rate) in report.runs.iter().zip(rates) {
+            let (bias, gain) = (r.bias_dps.unwrap(), r.angular_gain.unwrap());
+            assert!(holds(bias, BIAS_DPS) && bias.half_width() < 0.01, "{ppm} ppm, {}: {bias:?}", r.file);
+            assert!(holds(gain, -of(rate)), "{ppm} ppm, {}: {gain:?}", r.file);
+            assert_eq!(r.agrees, Some(true), "{ppm} ppm, {}", r.file);
+        }
+        assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+    }
+}

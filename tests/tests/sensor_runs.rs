@@ -1,0 +1,173 @@
+//! Two-channel sensors on a shaft: an eccentric shaft beside offsets, readouts that go with the temperature, and one run of several
+//! that is not like the others.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::recording::{Campaign, Recording, Role, Run};
+use cvg_calibration::{Identification, compensate};
+use cvg_tests::angle_sensor::{Noise, find, held_out, identified, run, sensor};
+
+/// Two channels as they are built, V, and the shaft that they sit on.
+#[derive(Clone, Copy)]
+struct Built {
+    offset_v: [f64; 2],
+    gain_ratio: f64,
+    skew: f64,
+    /// once a turn of the shaft, deg, and its phase, rad
+    eccentricity_deg: [f64; 2],
+    /// offset of x, V/K, and gain ratio, relative, 1/K
+    per_k: [f64; 2],
+}
+
+const BUILT: Built =
+    Built { offset_v: [0.02, -0.01], gain_ratio: 1.02, skew: 0.0, eccentricity_deg: [0.0; 2], per_k: [0.0; 2] };
+/// Noise of a channel, V, of an amplitude of 1 V.
+const NOISE_V: f64 = 4e-4;
+
+/// What the parameters refer to, °C.
+const REFERENCE_C: f64 = 25.0;
+
+/// 4000 rows in 20 s that turn as `table` says, deg, at this temperature, °C, read by channels of this angular gain.
+fn read(built: Built, table: impl Fn(f64) -> f64, temp_c: Option<fn(f64) -> f64>, gain: f64, seed: u64) -> Recording {
+    let mut noise = Noise::new(seed);
+    let t_s: Vec<f64> = (0..4000).map(|i| 0.005 * f64::from(i)).collect();
+    let angles: Vec<f64> = t_s.iter().map(|t| table(*t)).collect();
+    let temp_c: Option<Vec<f64>> = temp_c.map(|of| t_s.iter().map(|t| of(*t)).collect());
+    let read = |(i, a): (usize, &f64)| {
+        let [size, phase] = built.eccentricity_deg;
+        let warmer = temp_c.as_ref().map_or(0.0, |t| t[i] - REFERENCE_C);
+        let (sin, cos) = (gain * (a + size * (a.to_radians() + phase).sin())).to_radians().sin_cos();
+        let x = cos + built.offset_v[0] + built.per_k[0] * warmer + NOISE_V * noise.sample();
+        let ratio = built.gain_ratio * (1.0 + built.per_k[1] * warmer);
+        (x, ratio * (sin + built.skew * cos) + built.offset_v[1] + NOISE_V * noise.sample())
+    };
+    let (x, y) = angles.iter().enumerate().map(read).unzip();
+    Recording { t_s, table_deg: Some(angles), xc_v: Some(x), yc_v: Some(y), temp_c, ..Recording::default() }
+}
+
+/// At a steady rate.
+fn recorded(built: Built, rate_dps: f64, gain: f64, seed: u64) -> Recording {
+    read(built, |t| rate_dps * t, None, gain, seed)
+}
+
+fn of_runs(runs: Vec<Run>) -> Identification {
+    identified(Campaign { angular_gain: None, temperature_c: Some(REFERENCE_C), ..sensor(runs) })
+}
+
+/// Whether the interval of a parameter holds what was planted.
+fn holds(i: &Identification, effect: &str, at: usize, planted: f64) -> bool {
+    let found = find(i, effect).map(|e| e.parameters[at].ci95.unwrap());
+    found.is_some_and(|[low, high]| (low..=high).contains(&planted))
+}
+
+#[test]
+fn an_eccentric_shaft_is_not_taken_for_an_offset_of_the_channels() {
+    for seed in 0..4_u32 {
+        let built = Built { eccentricity_deg: [0.3, f64::from(seed)], ..BUILT };
+        let i = of_runs(vec![run("one-way.csv", Role::Fit, recorded(built, 37.0, 1.0, seed.into()))]);
+        let offsets = find(&i, "detection-offset");
+        assert!((0..2).all(|at| holds(&i, "detection-offset", at, BUILT.offset_v[at])), "seed {seed}: {offsets:?}");
+        let once = i.report.unexplained.iter().find(|u| u.n == Some(1)).unwrap_or_else(|| panic!("seed {seed}"));
+        assert!(once.suggestion.contains("eccentricity") && once.rms_deg > 0.1, "seed {seed}: {once:?}");
+        // 4e-4 V of noise are 0.023°
+        assert!(held_out(&i) < 0.025, "seed {seed}: {}°", held_out(&i));
+    }
+}
+
+#[test]
+fn offsets_without_an_eccentric_shaft_are_told_as_closely_as_the_noise_allows() {
+    for seed in 0..2 {
+        let i = of_runs(vec![run("one-way.csv", Role::Fit, recorded(BUILT, 37.0, 1.0, seed))]);
+        let offset = find(&i, "detection-offset").unwrap();
+        for (p, planted) in offset.parameters.iter().zip(BUILT.offset_v) {
+            let [low, high] = p.ci95.unwrap();
+            assert!((low..=high).contains(&planted) && high - low < 2e-4, "seed {seed}: {offset:?}");
+        }
+        assert!(i.report.unexplained.iter().all(|u| u.n != Some(1)), "seed {seed}: {:?}", i.report.unexplained);
+    }
+}
+
+fn there_and_back(t: f64) -> f64 {
+    300.0 * (0.35 * t).sin() + 100.0 * (0.9 * t).sin()
+}
+
+#[test]
+fn a_readout_that_goes_with_the_temperature_within_a_run_is_undone() {
+    let built = Built { per_k: [1e-4, 1e-3], ..BUILT };
+    let warming = |t: f64| 20.0 + 1.5 * t;
+    let i = of_runs(vec![run("warm.csv", Role::Fit, read(built, there_and_back, Some(warming), -2.0, 1))]);
+    assert!(holds(&i, "temperature", 0, 1e-3) && holds(&i, "offset-temperature", 0, 1e-4), "{:#?}", i.report.effects);
+    assert!(held_out(&i) < 0.025, "{}° of 0.023° noise", held_out(&i));
+    let ratio = i.report.detection_gain_ratio.unwrap().ci95;
+    assert!((ratio[0]..=ratio[1]).contains(&BUILT.gain_ratio), "{ratio:?}");
+    // it warmed all the time: a drift would look alike
+    assert!(i.report.warnings.iter().any(|w| w.contains("may be a drift")), "{:?}", i.report.warnings);
+    // another recording, colder than any that was calibrated
+    let cold = read(built, |t| 50.0 * t, Some(|_| 5.0), -2.0, 2);
+    let truth: Vec<f64> = cold.table_deg.iter().flatten().map(|a| -2.0 * a).collect();
+    let undone = compensate(&i.calibration, &cold).unwrap().theta_deg.unwrap();
+    let off: Vec<f64> = undone.iter().zip(&truth).map(|(a, b)| a - b).collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    let rms = (off.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt();
+    assert!(rms < 0.026, "{rms}°");
+    assert!(compensate(&i.calibration, &Recording { temp_c: None, ..cold }).is_err(), "without a temperature");
+}
+
+#[test]
+fn a_readout_that_goes_with_the_temperature_of_the_runs_is_undone() {
+    let built = Built { per_k: [0.0, 3e-4], ..BUILT };
+    let at: [fn(f64) -> f64; 4] = [|_| 0.0, |_| 25.0, |_| 50.0, |_| 70.0];
+    let rates = [40.0, -40.0, 40.0, -40.0];
+    let of = |count: usize| {
+        let runs = at.iter().zip(rates).take(count).enumerate().map(|(n, (temp_c, rate))| {
+            let recording = read(built, |t| rate * t, Some(*temp_c), -2.0, n as u64);
+            run(&format!("{n}.csv"), Role::Fit, recording)
+        });
+        of_runs(runs.collect())
+    };
+    let i = of(4);
+    assert!(holds(&i, "temperature", 0, 3e-4), "{:#?}", i.report.effects);
+    assert!(find(&i, "offset-temperature").is_none() && held_out(&i) < 0.025, "{}°", held_out(&i));
+    // of two temperatures nobody knows what else differed
+    let two = of(2);
+    assert!(find(&two, "temperature").is_none(), "{:#?}", two.report.effects);
+    assert!(
+        two.report.warnings.iter().any(|w| w.contains("runs at three temperatures tell")),
+        "{:?}",
+        two.report.warnings
+    );
+}
+
+#[test]
+fn a_temperature_that_nothing_follows_is_not_blamed() {
+    for seed in 0..4 {
+        let warming = |t: f64| 20.0 + 1.5 * t;
+        let i = of_runs(vec![run("warm.csv", Role::Fit, read(BUILT, there_and_back, Some(warming), -2.0, seed))]);
+        let blamed = ["temperature", "offset-temperature"].map(|id| find(&i, id).is_some());
+        assert_eq!(blamed, [false, false], "seed {seed}: {:#?}", i.report.effects);
+    }
+}
+
+#[test]
+fn one_run_that_is_not_like_the_others_is_left_out_with_what_is_odd_about_it() {
+    let eccentric = Built { eccentricity_deg: [1.5, 0.0], ..BUILT };
+    let other_gain = Built { gain_ratio: 1.07, ..BUILT };
+    let odd: [(Built, f64, &str); 3] = [
+        (eccentric, -2.0, "1.500° of the shaft, once a turn"),
+        (other_gain, -2.0, "its gain of Y over X is 1.0700 by itself, that of the others 1.0200"),
+        (BUILT, -2.004, "it turns 2.0040 times as far as its reference, the others 2.0000 times"),
+    ];
+    for (built, gain, said) in odd {
+        let runs = [(BUILT, -2.0, 40.0), (built, gain, -25.0), (BUILT, -2.0, 60.0)];
+        let runs = runs
+            .into_iter()
+            .enumerate()
+            .map(|(n, (built, gain, rate))| run(&format!("{n}.csv"), Role::Fit, recorded(built, rate, gain, n as u64)));
+        let i = of_runs(runs.collect());
+        let warning = i.report.warnings.iter().find(|w| w.starts_with("1.csv: left out")).cloned().unwrap_or_default();
+        assert!(warning.contains(said), "{said}: {:?}", i.report.warnings);
+        assert_eq!(i.report.runs.iter().map(|r| r.agrees).collect::<Vec<_>>(), [Some(true), Some(false), Some(true)]);
+        assert!(holds(&i, "detection-gain-mismatch", 0, 1.02) && held_out(&i) < 0.025, "{said}: {}°", held_out(&i));
+        let own = i.report.runs[0].angular_gain.unwrap();
+        assert!((own.value.abs() - 2.0).abs() < 1e-4 && own.half_width() < 1e-4, "{own:?}");
+    }
+}
