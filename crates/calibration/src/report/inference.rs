@@ -1,7 +1,7 @@
 //! What a fit says of the instrument: the angular gain, the ratios of the gains and the effects, each with its interval, where
 //! the campaign tells it.
 
-use cvg_model::effects::harmonic_n::{self, scaling::DIRECTION};
+use cvg_model::effects::harmonic_n;
 use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stage};
 use nalgebra::DMatrix;
 
@@ -184,11 +184,14 @@ impl Inference<'_> {
         Some(self.borne_out(ratio, warnings))
     }
 
-    /// What harmonics without a cause may hold of the detection gain ratio, which is ½(g − 1) sin 2θ at every rate.
+    /// What harmonics without a cause may hold of the detection gain ratio, which is ½(g − 1) sin 2θ: where they go with the
+    /// rate each run tells another ratio, and nothing tells which is the instrument's.
     fn held_by_harmonics(&self) -> f64 {
         let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
-        let alike = |m: &&Member| m.id == EffectId::HarmonicN && m.values[0] == 2.0 && m.values[3] <= DIRECTION;
-        causeless.filter(alike).map(|m| 2.0 * m.values[2].abs()).sum()
+        let second = causeless.filter(|m| m.id == EffectId::HarmonicN && m.values[0] == 2.0);
+        let precessions = || self.dataset.tracks.iter().map(|t| self.hypothesis().precession(t.track.mean_speed()));
+        let largest = |scaling: f64| precessions().map(|p| harmonic_n::factor(scaling, p).abs()).fold(0.0, f64::max);
+        second.map(|m| 2.0 * (m.values[2] * largest(m.values[3])).abs()).sum()
     }
 
     /// The detection gain ratio with an interval that also covers what the runs would tell of it without anisodamping, where
