@@ -100,7 +100,7 @@ fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Res
         }
         warnings.push(format!("{what}: what is wrong stands as a bias, and the angular gain's interval says nothing; {wanted} separates them"));
     }
-    let furthest = runs.iter().map(|run| run.travel_rad()).fold(0.0, f64::max);
+    let furthest = runs.iter().map(SensorRun::travel_rad).fold(0.0, f64::max);
     if furthest < std::f64::consts::TAU && model.gain.1.is_some() {
         warnings.push(format!(
             "the reference turns through {:.1}° only: were both rates in rad/s, their ratio would be right all the same and the bias \
