@@ -189,3 +189,18 @@ fn damaged_campaigns_are_not_lied_about() {
     assert!(lies.len() as f64 <= LIES * outcomes.len() as f64, "{} lies", lies.len());
     assert!(answers as f64 > 0.3 * outcomes.len() as f64, "{answers} answers");
 }
+
+/// Campaigns that were lied about once, each by a mechanism that was changed since.
+#[test]
+fn what_was_lied_about_once_is_right_now_or_no_answer() {
+    const ONCE: &[u64] =
+        &[2_000_043, 2_000_619, 6_001_049, 6_002_243, 6_006_326, 6_007_175, 6_008_274, 7_000_014, 8_000_313];
+    if std::env::var_os("CVG_DAMAGE").is_some() {
+        // the same numbers are other campaigns then
+        return;
+    }
+    for number in ONCE {
+        let outcome = outcome(*number);
+        assert!(!outcome.is_lie, "{}", outcome.what);
+    }
+}

@@ -1,6 +1,6 @@
 //! What a run is made ready to: angles unwrapped, commands beside them, segments between the jumps; and whether a
-//! recording is what it seems: rows that were not recorded anew or were drawn between others, what is there twice, references that contradict each other, samples that are
-//! too far apart, runs that do not belong together.
+//! recording is what it seems: rows that were not recorded anew or were drawn between others, what is there twice,
+//! references that contradict each other, samples that are too far apart, runs that do not belong together.
 
 pub(crate) mod agreement;
 pub(crate) mod copies;
