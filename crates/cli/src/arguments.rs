@@ -66,6 +66,7 @@ Examples:
 const FIRMWARE: &str = "\
 Examples:
   cvg firmware results/calibration.toml --out cvg_correction.h      float cvg_compensate(float x, float y)
+  cvg firmware results/calibration.toml --out correction.rs         of an angle: pub fn cvg_compensate(theta_deg: f32, …) -> f32
   cvg firmware results/calibration.toml --out table.csv --points 64";
 
 const EFFECTS: &str = "\
@@ -240,17 +241,17 @@ pub(crate) enum Command {
         #[command(flatten)]
         mapping: Mapping,
     },
-    /// Write the correction of a two-channel sensor for a controller: a C header with cvg_compensate(x, y), or a table
+    /// Write the correction of an angle sensor for a controller: cvg_compensate(x, y) or cvg_compensate(theta), or a table
     #[command(after_help = FIRMWARE)]
     Firmware {
         /// calibration.toml from `cvg identify`
         calibration: PathBuf,
-        /// C header (.h), or a table of the angle alone at the calibrated amplitude (.csv)
+        /// C header (.h), of an angle a Rust module too (.rs), or a table of the angle alone (.csv)
         #[arg(long)]
         out: PathBuf,
-        /// Points of a table over a period
-        #[arg(long, default_value_t = 256)]
-        points: usize,
+        /// Points of a table over a period: 256; of an angle, whose header is a series without, a table in its place
+        #[arg(long)]
+        points: Option<usize>,
     },
     /// The library of effects: what a recording can hold
     #[command(after_help = EFFECTS)]

@@ -1,55 +1,37 @@
-//! `cvg firmware`: the correction of a two-channel sensor for a controller without the crates: a C header with
-//! `cvg_compensate(x, y)`, or a table of the angle alone.
+//! The correction of two channels: a C header, or a table of the angle alone at the calibrated amplitude.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 
 use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::Instrument;
 use cvg_calibration::{ChannelClip, Hypothesis, Member};
 use cvg_model::Envelope;
-use cvg_model::effects::{EffectId, Inverse, Moment, Stage, Values};
+use cvg_model::effects::{EffectId, Inverse, Moment, Values};
 
-use crate::{Failure, output};
+use super::{Form, angle_table, closed, float, is_left_out, preamble, rows};
+use crate::Failure;
 
-/// Points of a period at which a table is checked, for each of its own.
-const CHECKED: usize = 16;
 /// Halvings of the search for a radius.
 const HALVINGS: usize = 80;
 /// A radius is looked for up to so many calibrated amplitudes.
 const FURTHEST: f64 = 8.0;
 
-/// Writes the header, or the table where the name ends in `.csv`.
-pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: usize) -> Result<(), Failure> {
-    let inputs: [PathBuf; 1] = [calibration_file.to_owned()];
-    output::check_file(out, &inputs)?;
-    if !(8..=65_536).contains(&points) {
-        return Err(Failure::input(format!("--points {points}: wanted 8 to 65536")));
+/// The correction as text.
+pub(super) fn text(
+    calibration: &Calibration,
+    left_out: &[String],
+    form: Form,
+    points: usize,
+) -> Result<String, Failure> {
+    let steps = steps(&calibration.hypothesis)?;
+    match form {
+        Form::Csv => lookup(calibration, points),
+        Form::C => Ok(header(calibration, &steps, left_out, points)),
+        Form::Rust => Err(Failure::input(
+            "of two channels there is a C header (.h) and a table (.csv); in Rust the readout is \
+             `cvg_estimator::Compensation`, and what the table adds the table's",
+        )),
     }
-    let calibration = Calibration::read(calibration_file)?;
-    let h = &calibration.hypothesis;
-    if h.instrument != Instrument::Sensor {
-        return Err(Failure::input(format!(
-            "{}: the calibration of a gyroscope, whose angle takes four components and the loops; in C that is cvg.h, in Rust \
-             `cvg_estimator::Compensation` (chapter Firmware and C)",
-            calibration_file.display()
-        )));
-    }
-    let steps = steps(h)?;
-    let left_out: Vec<&str> =
-        h.members.iter().filter(|m| kind(m) == Kind::LeftOut).map(|m| m.id.description().id).collect();
-    if !left_out.is_empty() {
-        output::tell(format_args!(
-            "not in it: {}, which two readings alone do not tell: it follows the table, the clock, the rate or the temperature",
-            left_out.join(", ")
-        ));
-    }
-    let table = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-    let text = if table { lookup(&calibration, points)? } else { header(&calibration, &steps, &left_out, points) };
-    output::write(out, text.as_bytes(), &inputs)?;
-    output::tell(format_args!("wrote {}", out.display()));
-    Ok(())
 }
 
 /// What becomes of an effect.
@@ -67,14 +49,7 @@ fn kind(m: &Member) -> Kind {
     match id.inverse(&m.values) {
         Inverse::Affine => Kind::Affine,
         Inverse::Cubic(cubic) => Kind::Cubic(cubic.coefficients()),
-        Inverse::Unread
-            if id.description().stage != Stage::Readout
-                || id.acts_on_angle()
-                || id.in_time()
-                || id.by_temperature() =>
-        {
-            Kind::LeftOut
-        }
+        Inverse::Unread if is_left_out(m) => Kind::LeftOut,
         Inverse::Unread => Kind::Refused,
     }
 }
@@ -134,43 +109,29 @@ fn after(n: [f64; 6], b: [f64; 6]) -> [f64; 6] {
     ]
 }
 
-/// A number as C reads it in single precision, with all the digits that has.
-fn float(value: f64) -> String {
-    format!("{value:.9e}f")
-}
-
-fn header(calibration: &Calibration, steps: &[Step], left_out: &[&str], points: usize) -> String {
+fn header(calibration: &Calibration, steps: &[Step], left_out: &[String], points: usize) -> String {
     let h = &calibration.hypothesis;
     let mut s = String::new();
     let mut line = |text: &str| {
         let _ = writeln!(s, "{text}");
     };
-    let device = output::plain(&calibration.device).replace("*/", "* /");
-    line(&format!(
-        "/* Correction of the sensor {device}, written by cvg {}. C99; needs atan2f and fmodf.",
-        env!("CARGO_PKG_VERSION")
-    ));
-    line(" *");
-    line(" *     float angle_deg = cvg_compensate(x, y);");
-    line(" *");
-    line(
-        " * x and y are the readings of the two channels in the unit in which they were calibrated; the angle is the sensor's own,",
-    );
-    line(&format!(
-        " * from 0 up to {:.0} degrees, {} periods a turn of the reference. Nothing is kept between calls.",
-        h.period_rad.to_degrees(),
-        h.angular_gain
-    ));
+    let mut how = vec![
+        String::new(),
+        "    float angle_deg = cvg_compensate(x, y);".into(),
+        String::new(),
+        "x and y are the readings of the two channels in the unit in which they were calibrated; the angle is the sensor's own,".into(),
+        format!(
+            "from 0 up to {:.0} degrees, {} periods a turn of the reference. Nothing is kept between calls.",
+            h.period_rad.to_degrees(),
+            h.angular_gain
+        ),
+    ];
     if let Some([low, high]) = calibration.provenance.amplitude_v {
-        line(&format!(" * Calibrated at amplitudes from {low:.6} to {high:.6}; beyond them it is extrapolated."));
+        how.push(format!("Calibrated at amplitudes from {low:.6} to {high:.6}; beyond them it is extrapolated."));
     }
-    if !left_out.is_empty() {
-        line(&format!(" * Not in it, since two readings do not tell it: {}.", left_out.join(", ")));
-    }
-    for i in &calibration.provenance.inputs {
-        let file = output::plain(&i.file).replace("*/", "* /");
-        line(&format!(" * From {file}, CRC-32 {}.", i.crc32.as_deref().unwrap_or("unknown")));
-    }
+    let head = preamble(calibration, "C99; needs atan2f and fmodf.", &how, left_out, "two readings do");
+    line(&format!("/* {}", head[0]));
+    head[1..].iter().for_each(|text| line(format!(" * {text}").trim_end()));
     line(" */\n#ifndef CVG_CORRECTION_H\n#define CVG_CORRECTION_H\n#include <math.h>\n");
     if steps.iter().any(|step| matches!(step, Step::Cubic(_))) {
         line(ROOT);
@@ -182,10 +143,7 @@ fn header(calibration: &Calibration, steps: &[Step], left_out: &[&str], points: 
             table.len()
         ));
         line(&format!("static const float cvg_table[{}] = {{", table.len() + 1));
-        let closed: Vec<f64> = table.iter().chain(table.first()).copied().collect();
-        for row in closed.chunks(6) {
-            line(&format!("    {},", row.iter().map(|v| float(*v)).collect::<Vec<_>>().join(", ")));
-        }
+        rows(&closed(table), float).iter().for_each(|row| line(row));
         line("};\n");
     }
     line("static inline float cvg_compensate(float x, float y)\n{");
@@ -238,10 +196,7 @@ fn body(line: &mut dyn FnMut(&str), h: &Hypothesis, steps: &[Step], points: Opti
             "    {{\n        const float at = angle * {};",
             float(points as f64 / h.period_rad.to_degrees())
         ));
-        line(&format!(
-            "        int i = (int)at;\n        if (i > {0}) i = {0};\n        if (i < 0) i = 0;",
-            points - 1
-        ));
+        line(&format!("        const int i = at >= 0.0f && at < {points}.0f ? (int)at : {};", points - 1));
         line("        angle += cvg_table[i] + (at - (float)i) * (cvg_table[i + 1] - cvg_table[i]);\n    }");
         line(&format!("    angle = fmodf(angle + {period}, {period});"));
     }
@@ -268,21 +223,6 @@ fn rails(line: &mut dyn FnMut(&str), clip: &ChannelClip) {
         ));
         line(&format!("        {own} = copysignf(fmaxf(root, fabsf({own})), {own});\n    }}"));
     }
-}
-
-/// What the table adds to an angle, deg, at even angles of a period, and how far straight lines between them are off.
-fn angle_table(h: &Hypothesis, points: usize) -> Option<(Vec<f64>, f64)> {
-    let table = h.angle_table.as_ref()?;
-    let (cycles, step) = (TAU / h.period_rad, h.period_rad / points as f64);
-    let add = |theta: f64| (table.undo(theta, cycles) - theta).to_degrees();
-    let values: Vec<f64> = (0..points).map(|i| add(i as f64 * step)).collect();
-    let off = |i: usize| {
-        let (at, part) = (i / CHECKED, (i % CHECKED) as f64 / CHECKED as f64);
-        let (low, high) = (values[at], values[(at + 1) % points]);
-        (low + part * (high - low) - add((at as f64 + part) * step)).abs()
-    };
-    let worst = (0..CHECKED * points).map(off).fold(0.0, f64::max);
-    Some((values, worst))
 }
 
 /// A table of the angle alone: what is read as atan2(y, x), and what is to be added, at the calibrated amplitude.

@@ -1,0 +1,165 @@
+//! `cvg firmware`: the correction of an angle sensor for a controller without the crates. Of two channels a C header with
+//! `cvg_compensate(x, y)`, of an angle one with `cvg_compensate(theta)`, in C or in Rust; or a table of the angle alone.
+
+mod angle;
+mod channels;
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+use cvg_calibration::calibration::Calibration;
+use cvg_calibration::recording::Instrument;
+use cvg_calibration::{Hypothesis, Member};
+use cvg_model::effects::{Inverse, Stage};
+
+use crate::{Failure, output};
+
+/// Points of a period at which a table is checked, for each of its own.
+const CHECKED: usize = 16;
+/// Points of a table where nobody says how many.
+const POINTS: usize = 256;
+
+/// What is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// a header
+    C,
+    /// a module
+    Rust,
+    /// a table
+    Csv,
+}
+
+impl Form {
+    fn of(file: &Path) -> Self {
+        let is = |name: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
+        match (is("csv"), is("rs")) {
+            (true, _) => Self::Csv,
+            (_, true) => Self::Rust,
+            _ => Self::C,
+        }
+    }
+}
+
+/// Writes the header, the module where the name ends in `.rs`, or the table where it ends in `.csv`.
+pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: Option<usize>) -> Result<(), Failure> {
+    let inputs: [PathBuf; 1] = [calibration_file.to_owned()];
+    output::check_file(out, &inputs)?;
+    if let Some(points) = points.filter(|points| !(8..=65_536).contains(points)) {
+        return Err(Failure::input(format!("--points {points}: wanted 8 to 65536")));
+    }
+    let calibration = Calibration::read(calibration_file)?;
+    let h = &calibration.hypothesis;
+    if h.instrument != Instrument::Sensor {
+        return Err(Failure::input(format!("{}: {}", calibration_file.display(), of_a_gyroscope(h))));
+    }
+    let left_out: Vec<String> = h.members.iter().filter(|m| is_left_out(m)).map(with_values).collect();
+    let of_an_angle = is_of_an_angle(&calibration);
+    if !left_out.is_empty() {
+        output::tell(format_args!(
+            "not in it: {}, which {} alone {} not tell: it follows the table, the clock, the rate or the temperature",
+            left_out.join(", "),
+            if of_an_angle { "the angle" } else { "two readings" },
+            if of_an_angle { "does" } else { "do" },
+        ));
+    }
+    let text = if of_an_angle {
+        if h.angle_table.is_none() {
+            output::tell(format_args!("nothing was found to be corrected: the angle is given as it is read"));
+        }
+        angle::text(&calibration, &left_out, Form::of(out), points)
+    } else {
+        channels::text(&calibration, &left_out, Form::of(out), points.unwrap_or(POINTS))?
+    };
+    output::write(out, text.as_bytes(), &inputs)?;
+    output::tell(format_args!("wrote {}", out.display()));
+    Ok(())
+}
+
+/// The calibration is of a sensor of which an angle was read, and no channels.
+fn is_of_an_angle(calibration: &Calibration) -> bool {
+    let h = &calibration.hypothesis;
+    calibration.provenance.amplitude_v.is_none() && h.clip.is_none() && h.members.iter().all(is_left_out)
+}
+
+/// Why there is no header of this gyroscope, and what there is.
+fn of_a_gyroscope(h: &Hypothesis) -> String {
+    if h.period_rad > 4.0 {
+        return format!(
+            "the calibration of a rate gyroscope is two numbers: take its bias, {:.9} deg/s, from each rate, and divide by its scale \
+             factor, {:.9}",
+            h.rate_bias_rad_s.to_degrees(),
+            h.angular_gain.abs()
+        );
+    }
+    "the calibration of a gyroscope, whose angle takes four components and the loops; in C that is cvg.h, in Rust \
+     `cvg_estimator::Compensation` (chapter Firmware and C)"
+        .into()
+}
+
+/// An effect that what is read at one moment does not tell.
+fn is_left_out(m: &Member) -> bool {
+    let id = m.id;
+    matches!(id.inverse(&m.values), Inverse::Unread)
+        && (id.description().stage != Stage::Readout || id.acts_on_angle() || id.in_time() || id.by_temperature())
+}
+
+/// An effect by its name, with its values.
+fn with_values(m: &Member) -> String {
+    let parameters = m.id.description().parameters.iter().zip(m.values);
+    let values: Vec<String> = parameters.map(|(p, v)| format!("{} {v:.6} {}", p.name, p.unit)).collect();
+    format!("{} ({})", m.id.description().id, values.join(", "))
+}
+
+/// What stands above a correction: whose it is, how it is called, what is not in it and what it was made from.
+fn preamble(calibration: &Calibration, needs: &str, how: &[String], left_out: &[String], told_by: &str) -> Vec<String> {
+    let mut lines = vec![format!(
+        "Correction of the sensor {}, written by cvg {}. {needs}",
+        one_line(&calibration.device),
+        env!("CARGO_PKG_VERSION")
+    )];
+    lines.extend_from_slice(how);
+    if !left_out.is_empty() {
+        lines.push(format!("Not in it, since {told_by} not tell it: {}.", left_out.join(", ")));
+    }
+    for i in &calibration.provenance.inputs {
+        lines.push(format!("From {}, CRC-32 {}.", one_line(&i.file), i.crc32.as_deref().unwrap_or("unknown")));
+    }
+    lines
+}
+
+/// A word out of a file that ends no comment, of C or of Rust.
+fn one_line(text: &str) -> String {
+    output::plain(text).replace("*/", "* /").replace(['\n', '\r'], " ")
+}
+
+/// A number as C reads it in single precision, with all the digits that has.
+fn float(value: f64) -> String {
+    format!("{value:.9e}f")
+}
+
+/// What the table adds to an angle, deg, at even angles of a period, and how far straight lines between them are off.
+fn angle_table(h: &Hypothesis, points: usize) -> Option<(Vec<f64>, f64)> {
+    let table = h.angle_table.as_ref()?;
+    let (cycles, step) = (TAU / h.period_rad, h.period_rad / points as f64);
+    let add = |theta: f64| (table.undo(theta, cycles) - theta).to_degrees();
+    let values: Vec<f64> = (0..points).map(|i| add(i as f64 * step)).collect();
+    let off = |i: usize| {
+        let (at, part) = (i / CHECKED, (i % CHECKED) as f64 / CHECKED as f64);
+        let (low, high) = (values[at], values[(at + 1) % points]);
+        (low + part * (high - low) - add((at as f64 + part) * step)).abs()
+    };
+    let worst = (0..CHECKED * points).map(off).fold(0.0, f64::max);
+    Some((values, worst))
+}
+
+/// Numbers of an array, six a line; the separator of the language stands behind each.
+fn rows(values: &[f64], number: impl Fn(f64) -> String) -> Vec<String> {
+    let line = |row: &[f64]| format!("    {},", row.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", "));
+    values.chunks(6).map(line).collect()
+}
+
+/// The values of a period and the first of the next.
+fn closed(table: &[f64]) -> Vec<f64> {
+    table.iter().chain(table.first()).copied().collect()
+}
