@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 use std::collections::BTreeSet;
 
-use cvg_instrument::{Fault, Mode, Settings, Status, Wish};
+use cvg_instrument::{Fault, Mode, RequestedMode, Settings, Status};
 use cvg_simulator::carrier::{CarrierLoop, CarrierPlant};
 
 use crate::bench::Draws;
@@ -27,7 +27,7 @@ pub enum Wrong {
     BrownOut,
     /// one sample is inverted, the other channel's anything
     Glitch,
-    /// rest is wished
+    /// rest is requested
     Off,
 }
 
@@ -215,7 +215,7 @@ impl Soak {
                 self.carrier.state = self.carrier.instrument().start();
                 self.beyond_deg = None;
             }
-            Wrong::Off => self.carrier.state.wish(Wish::Off),
+            Wrong::Off => self.carrier.state.request(RequestedMode::Off),
             _ => {}
         }
     }
@@ -224,7 +224,7 @@ impl Soak {
     fn step(&mut self) -> Option<Status> {
         if let Some(event) = self.event.filter(|e| self.sample >= e.ends) {
             if event.wrong == Wrong::Off {
-                self.carrier.state.wish(Wish::WholeAngle);
+                self.carrier.state.request(RequestedMode::WholeAngle);
             }
             self.event = None;
         }

@@ -4,7 +4,7 @@
 use core::f64::consts::{PI, TAU};
 
 use cvg_estimator::{Demodulator, Oscillator, Precession, PrecessionState, Status, Window};
-use cvg_instrument::{Instrument, Mode, Settings, Tuning, Wish};
+use cvg_instrument::{Instrument, Mode, RequestedMode, Settings, Tuning};
 use cvg_model::resonator::carrier::{Motion, Rotation};
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{Envelope, Orbit};
@@ -112,7 +112,7 @@ for_each_scalar! {
     #[test]
     fn prop_no_input_and_no_state_makes_a_command_without_bounds(
         patterns in prop::collection::vec(any::<u64>(), 40), inputs in prop::collection::vec((any::<u64>(), any::<u64>()), 120),
-        started in any::<bool>(), wish in 0_usize..4,
+        started in any::<bool>(), requested in 0_usize..4,
     ) {
         let settings = Settings { window: 8, sample_hz: 100_000.0, ..Settings::default() };
         let instrument = Instrument::<T>::new(&settings).unwrap();
@@ -120,7 +120,7 @@ for_each_scalar! {
         if started {
             state.supervisor.mode = Mode::WholeAngle;
         }
-        state.wish([Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off][wish]);
+        state.request([RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off][requested]);
         let mut next = patterns.iter().cycle().map(|p| T::from_pattern(*p));
         let mut number = || next.next().expect("a cycle");
         for place in [
@@ -155,14 +155,14 @@ fn decay(omega: f64, zeta: f64, t_s: f64) -> f64 {
 fn off_the_law(
     tuning: Tuning,
     settings: &Settings<'_>,
-    wish: Wish,
+    requested: RequestedMode,
     disturb: impl Fn(&mut Watched<f64>),
     error: impl Fn(&Watched<f64>) -> f64,
 ) -> f64 {
     // a perfect device without noise: what is left is the loop
     let device = CarrierDevice { noise_v: 1e-6, adc: (2.5, 0), dac: (10.0, 0), ..CarrierDevice::default() };
     let mut l = Watched::<f64>::new(&device, settings);
-    l.state().wish(wish);
+    l.state().request(requested);
     l.run(6.0);
     assert!(matches!(l.status.mode, Mode::WholeAngle | Mode::Hold), "{:?}", l.status);
     while !l.status.fresh {
@@ -202,7 +202,7 @@ fn each_loop_answers_a_disturbance_as_it_was_tuned() {
     let energy = off_the_law(
         TUNED,
         &Settings { energy: TUNED, ..Settings::default() },
-        Wish::WholeAngle,
+        RequestedMode::WholeAngle,
         |l| {
             let v = l.carrier.plant.vibration();
             l.carrier.plant.set_vibration(&(v * 1.01));
@@ -212,7 +212,7 @@ fn each_loop_answers_a_disturbance_as_it_was_tuned() {
     let quadrature = off_the_law(
         TUNED,
         &Settings { quadrature: TUNED, ..Settings::default() },
-        Wish::WholeAngle,
+        RequestedMode::WholeAngle,
         |l| {
             let v = l.carrier.plant.vibration();
             let across = v.turned(1.0, 0.0).quarter_ahead();
@@ -223,14 +223,14 @@ fn each_loop_answers_a_disturbance_as_it_was_tuned() {
     let rate = off_the_law(
         TUNED,
         &Settings { rate: TUNED, ..Settings::default() },
-        Wish::Hold,
+        RequestedMode::Hold,
         |l| turned(l, 0.01),
         |l| l.carrier.state.seen.compensated.pendulum().angle(),
     );
     let phase = off_the_law(
         TUNED,
         &Settings { phase: TUNED, ..Settings::default() },
-        Wish::WholeAngle,
+        RequestedMode::WholeAngle,
         |l| l.state().phasor = l.state().phasor.turned(0.01_f64.cos(), 0.01_f64.sin()),
         |l| {
             let p = l.carrier.state.seen.compensated.pendulum();
@@ -366,7 +366,7 @@ fn settings_outside_their_domain_are_refused_by_name() {
     assert_eq!(refused(Settings { window: 4, ..base }), Some("samples"));
     assert_eq!(refused(Settings { window: 400, ..base }), Some("window"));
     assert_eq!(refused(Settings { drive_delay_s: -1.0, ..base }), Some("drive_delay_s"));
-    assert_eq!(refused(Settings { heard_v: 0.5, ..base }), Some("heard_v"));
+    assert_eq!(refused(Settings { detection_threshold_v: 0.5, ..base }), Some("detection_threshold_v"));
     assert_eq!(refused(Settings { hold_rad: f64::INFINITY, ..base }), Some("theta_rad"));
     let fast = Tuning { bandwidth_hz: 1000.0, damping: 1.0 };
     assert_eq!(refused(Settings { energy: fast, ..base }), Some("bandwidth_rad_s"));

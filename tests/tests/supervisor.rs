@@ -27,7 +27,7 @@ fn supervisor() -> Supervisor<f64> {
     Supervisor::new(&SupervisorSettings {
         window_s: WINDOW_S,
         amplitude_v: 1.0,
-        heard_v: 0.05,
+        detection_threshold_v: 0.05,
         band_rad_s: 100.0,
         sweep_s: windows(SWEEP),
         sweeps: SWEEPS,
@@ -35,10 +35,10 @@ fn supervisor() -> Supervisor<f64> {
         lock_s: windows(LOCK),
         spin_up_s: windows(SPIN_UP),
         coast_s: windows(COAST),
-        endure_s: windows(ENDURE),
+        fault_debounce_s: windows(ENDURE),
         rest_s: windows(REST),
         retries: 2,
-        forget_s: windows(FORGET),
+        fault_memory_s: windows(FORGET),
     })
     .expect("inside its domain")
 }
@@ -111,7 +111,7 @@ proptest! {
 
     //= specs/dsp.md#faults-cannot-be-walked-around
     //= type=test
-    //# A window out of bounds MUST be counted until a fault is named, rest is wished, or all was well for the time that is endured.
+    //# A window out of bounds MUST be counted until a fault is named, rest is requested, or all was well for the time that is endured.
     #[test]
     fn prop_what_is_out_of_bounds_more_often_than_is_endured_is_a_fault(
         e in 2.3..1e3_f64, gaps in prop::collection::vec(0..ENDURE, 1..9), clipped: bool,

@@ -5,7 +5,7 @@ use core::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use cvg_controller::{ActuationCompensation, Allocation, Fault, OrbitCommands, Pi, PiState};
 use cvg_estimator::{LockState, PhaseLock, Precession, PrecessionState};
-use cvg_instrument::{Instrument, Mode, Settings, State, Wish};
+use cvg_instrument::{Instrument, Mode, RequestedMode, Settings, State};
 use cvg_model::effects::{EffectId, Values};
 use cvg_model::{ControlOutputs, Envelope, Pendulum};
 use cvg_tests::domain::patterns;
@@ -126,7 +126,8 @@ fn history<T: Scalar>(state: &mut State<T>, dice: &mut ChaCha8Rng) {
     let v = &mut state.supervisor;
     v.mode = Mode::ALL[dice.random_range(0..Mode::ALL.len())];
     v.fault = Some([Fault::InvalidSamples, Fault::NoLock, Fault::AmplitudeHigh][dice.random_range(0..3)]);
-    v.wish = [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off][dice.random_range(0..4)];
+    v.requested = [RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off]
+        [dice.random_range(0..4)];
     let few = |dice: &mut ChaCha8Rng| dice.next_u32() >> dice.random_range(0..32_u32);
     (v.windows, v.good, v.bad) = (few(dice), few(dice), few(dice));
     (v.repeats, v.clipped, v.trying) = (few(dice), few(dice), few(dice));

@@ -135,7 +135,7 @@ fn c_loop(s: &Settings<'_>) -> (Config, State) {
         lead: (s.group_delay_s() + s.drive_delay_s + 0.5 * window_s) / window_s,
         share: 1.0 / 16.0,
         jump: (2.0 * (s.fastest_rad_s * window_s + 0.1)).sin(),
-        least_2: (0.2 * s.heard_v).powi(2),
+        least_2: (0.2 * s.detection_threshold_v).powi(2),
         delay_cos_sin: [(omega * delay).cos(), (omega * delay).sin()],
         delay,
         dac_limit: s.dac_limit_v,

@@ -83,22 +83,22 @@ typedef uint8_t cvg_record;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What is wanted: an argument of cvg_wish.
-enum cvg_wish_for
+// What is wanted: an argument of cvg_request.
+enum cvg_requested_mode
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint8_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-  CVG_WISH_WHOLE_ANGLE,
-  CVG_WISH_HOLD,
-  CVG_WISH_RING_DOWN,
-  CVG_WISH_OFF,
+  CVG_REQUEST_WHOLE_ANGLE,
+  CVG_REQUEST_HOLD,
+  CVG_REQUEST_RING_DOWN,
+  CVG_REQUEST_OFF,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum cvg_wish_for cvg_wish_for;
+typedef enum cvg_requested_mode cvg_requested_mode;
 #else
-typedef uint8_t cvg_wish_for;
+typedef uint8_t cvg_requested_mode;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -153,7 +153,7 @@ typedef struct {
   // the fastest precession that is no jump, rad/s
   double fastest_rad_s;
   // amplitude above which something vibrates, V
-  double heard_v;
+  double detection_threshold_v;
   // time of the first sweep, s
   double sweep_s;
   // readout effects that are undone: so many, up to CVG_MOST_COMPENSATED
@@ -356,12 +356,12 @@ cvg_output cvg_step(const cvg_instrument *instrument,
                     float adc_x,
                     float adc_y);
 
-// What is wanted from the next control step on, of enum cvg_wish_for; false where there is no such wish.
+// What is wanted from the next control step on, of enum cvg_requested_mode; false where there is no such mode.
 //
 // # Safety
 // That of cvg_step.
-bool cvg_wish(cvg_state *state,
-              uint8_t wish);
+bool cvg_request(cvg_state *state,
+                 uint8_t requested);
 
 // Takes back that half turns may be lost: whoever reads the angle has set it right, or does not need it.
 //

@@ -13,7 +13,7 @@ pub mod calibrator;
 use core::ffi::{CStr, c_char};
 use core::mem::{align_of, size_of};
 
-use cvg_instrument::{MOST_COMPENSATED, Wish};
+use cvg_instrument::{MOST_COMPENSATED, RequestedMode};
 use cvg_model::effects::{EffectId, Values};
 
 type Single = cvg_instrument::Instrument<f32>;
@@ -76,7 +76,7 @@ pub struct Settings {
     /// the fastest precession that is no jump, rad/s
     pub fastest_rad_s: f64,
     /// amplitude above which something vibrates, V
-    pub heard_v: f64,
+    pub detection_threshold_v: f64,
     /// time of the first sweep, s
     pub sweep_s: f64,
     /// readout effects that are undone: so many, up to CVG_MOST_COMPENSATED
@@ -162,15 +162,15 @@ pub enum cvg_fault {
     CVG_QUADRATURE_HIGH,
 }
 
-/// What is wanted: an argument of cvg_wish.
+/// What is wanted: an argument of cvg_request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-#[allow(non_camel_case_types, missing_docs, reason = "the names of C; each is the wish of its name in the library")]
-pub enum cvg_wish_for {
-    CVG_WISH_WHOLE_ANGLE,
-    CVG_WISH_HOLD,
-    CVG_WISH_RING_DOWN,
-    CVG_WISH_OFF,
+#[allow(non_camel_case_types, missing_docs, reason = "the names of C; each is the mode of its name in the library")]
+pub enum cvg_requested_mode {
+    CVG_REQUEST_WHOLE_ANGLE,
+    CVG_REQUEST_HOLD,
+    CVG_REQUEST_RING_DOWN,
+    CVG_REQUEST_OFF,
 }
 
 /// What a step answers.
@@ -254,7 +254,7 @@ pub extern "C" fn cvg_settings_default() -> Settings {
         rate: tuning(s.rate),
         hold_rad: s.hold_rad,
         fastest_rad_s: s.fastest_rad_s,
-        heard_v: s.heard_v,
+        detection_threshold_v: s.detection_threshold_v,
         sweep_s: s.sweep_s,
         readout: core::ptr::null(),
         readout_count: 0,
@@ -370,7 +370,7 @@ unsafe fn built(settings: *const Settings) -> Result<Single, cvg_instrument::Con
         rate: tuning(s.rate),
         hold_rad: s.hold_rad,
         fastest_rad_s: s.fastest_rad_s,
-        heard_v: s.heard_v,
+        detection_threshold_v: s.detection_threshold_v,
         sweep_s: s.sweep_s,
         readout: readout.get(..read).unwrap_or_default(),
         actuation: actuation.get(..actuated).unwrap_or_default(),
@@ -437,17 +437,17 @@ fn fault(fault: cvg_instrument::Fault) -> cvg_fault {
     }
 }
 
-/// What is wanted from the next control step on, of enum cvg_wish_for; false where there is no such wish.
+/// What is wanted from the next control step on, of enum cvg_requested_mode; false where there is no such mode.
 ///
 /// # Safety
 /// That of cvg_step.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cvg_wish(state: *mut StateMemory, wish: u8) -> bool {
+pub unsafe extern "C" fn cvg_request(state: *mut StateMemory, requested: u8) -> bool {
     // SAFETY: the caller's promise
     let Some(state) = (unsafe { state.cast::<SingleState>().as_mut() }) else { return false };
-    let wishes = [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off];
-    let Some(wish) = wishes.get(usize::from(wish)) else { return false };
-    state.wish(*wish);
+    let requests = [RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off];
+    let Some(requested) = requests.get(usize::from(requested)) else { return false };
+    state.request(*requested);
     true
 }
 

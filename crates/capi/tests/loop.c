@@ -163,7 +163,7 @@ int main(void) {
     for (long k = 0; k < 5000; k++) out = sample(&s, &instrument, &state, &r, false);
     expect(out.mode == CVG_WHOLE_ANGLE, "back after a reading that is no number");
 
-    expect(!cvg_wish(&state, 17) && cvg_wish(&state, CVG_WISH_HOLD), "a wish is taken, no other");
+    expect(!cvg_request(&state, 17) && cvg_request(&state, CVG_REQUEST_HOLD), "a request is taken, no other");
     for (long k = 0; k < 200000; k++) out = sample(&s, &instrument, &state, &r, false);
     printf("held at %.3f deg\n", cvg_angle_deg(&state));
     expect(out.mode == CVG_HOLD && fabs(remainder(cvg_angle_deg(&state), 180.0)) < 1.0, "held");

@@ -1,4 +1,4 @@
-//! What C is given is what Rust is given: every setting, output, mode, fault and wish, field by field; and nothing where
+//! What C is given is what Rust is given: every setting, output, mode, fault and requested mode, field by field; and nothing where
 //! C gives nothing.
 #![allow(unsafe_code, reason = "the interface is C's")]
 
@@ -7,9 +7,9 @@ use std::ptr::{null, null_mut};
 
 use cvg::{
     Effect, InstrumentMemory, Output, Settings, StateMemory, Tuning, cvg_acknowledge_half_turns, cvg_angle_deg,
-    cvg_init, cvg_last_control, cvg_settings_default, cvg_step, cvg_wish,
+    cvg_init, cvg_last_control, cvg_request, cvg_settings_default, cvg_step,
 };
-use cvg_instrument::{Fault, Instrument, Mode, State, Status, Wish};
+use cvg_instrument::{Fault, Instrument, Mode, RequestedMode, State, Status};
 use cvg_model::effects::EffectId;
 
 type Rust = cvg_instrument::Settings<'static>;
@@ -80,7 +80,7 @@ fn in_c(s: &Rust) -> Settings {
         rate: tuning(s.rate),
         hold_rad: s.hold_rad,
         fastest_rad_s: s.fastest_rad_s,
-        heard_v: s.heard_v,
+        detection_threshold_v: s.detection_threshold_v,
         sweep_s: s.sweep_s,
         readout: null(),
         readout_count: 0,
@@ -109,7 +109,7 @@ fn uncommon() -> Rust {
         rate: tuning(2.4, 0.95),
         hold_rad: 0.2,
         fastest_rad_s: 33.0,
-        heard_v: 0.03,
+        detection_threshold_v: 0.03,
         sweep_s: 0.3,
         readout: READOUT,
         actuation: ACTUATION,
@@ -301,19 +301,24 @@ fn every_mode_and_every_fault_has_its_name() {
 }
 
 #[test]
-fn wishes_are_those_of_their_number_and_others_are_refused() {
+fn requests_are_those_of_their_number_and_others_are_refused() {
     let (mut of, ..) = both();
-    for (n, wish) in [(3, Wish::Off), (1, Wish::Hold), (2, Wish::RingDown), (0, Wish::WholeAngle)] {
+    for (n, requested) in [
+        (3, RequestedMode::Off),
+        (1, RequestedMode::Hold),
+        (2, RequestedMode::RingDown),
+        (0, RequestedMode::WholeAngle),
+    ] {
         // SAFETY: filled by `cvg_init`
-        assert!(unsafe { cvg_wish(&raw mut of.state, n) });
-        assert_eq!(of.state().supervisor.wish, wish);
+        assert!(unsafe { cvg_request(&raw mut of.state, n) });
+        assert_eq!(of.state().supervisor.requested, requested);
     }
-    of.state().supervisor.wish = Wish::Hold;
+    of.state().supervisor.requested = RequestedMode::Hold;
     for n in 4..=u8::MAX {
         // SAFETY: filled by `cvg_init`
-        assert!(!unsafe { cvg_wish(&raw mut of.state, n) }, "{n}");
+        assert!(!unsafe { cvg_request(&raw mut of.state, n) }, "{n}");
     }
-    assert_eq!(of.state().supervisor.wish, Wish::Hold);
+    assert_eq!(of.state().supervisor.requested, RequestedMode::Hold);
     (of.state().continuity.lost, of.state().status.half_turns_lost) = (true, true);
     // SAFETY: filled by `cvg_init`
     unsafe { cvg_acknowledge_half_turns(&raw mut of.state) };
@@ -342,7 +347,7 @@ fn nothing_is_answered_with_nothing() {
             assert_eq!((out.clipped, out.half_turns_lost), (false, true));
             assert!(alike(&out.mode, &Mode::Fault) && alike(&out.fault, &Fault::InvalidSamples));
         }
-        assert!(!cvg_wish(null_mut(), 0));
+        assert!(!cvg_request(null_mut(), 0));
         cvg_acknowledge_half_turns(null_mut());
         assert_eq!(cvg_angle_deg(null()), 0.0);
         assert_eq!(cvg_last_control(null()), cvg::Seen::default());

@@ -34,7 +34,7 @@ pub mod supervisor;
 pub use allocation::{ActuationCompensation, Allocation, OrbitCommands};
 pub use pi::{Pi, PiState};
 pub use rate::{Heading, RateLoop};
-pub use supervisor::{Fault, Mode, Orders, Supervisor, SupervisorSettings, SupervisorState, Wish};
+pub use supervisor::{Fault, LoopCommand, Mode, RequestedMode, Supervisor, SupervisorSettings, SupervisorState};
 
 use cvg_model::Float;
 

@@ -7,7 +7,7 @@
 //! Nothing goes on for ever: a start has a budget of windows that only a fault or a time in operation renews, and what was
 //! out of bounds is forgotten only after a time in which nothing was.
 //!
-//! It refuses to measure and to compute forces: it takes one [`Observation`] a window and gives one [`Orders`]. Times are
+//! It refuses to measure and to compute forces: it takes one [`Observation`] a window and gives one [`LoopCommand`]. Times are
 //! counted in windows, in integers, so that a mode lasts equally long in every precision.
 
 use cvg_model::{Float, Pendulum};
@@ -82,7 +82,7 @@ pub enum Fault {
 
 /// What the user wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Wish {
+pub enum RequestedMode {
     /// a free pattern
     #[default]
     WholeAngle,
@@ -90,7 +90,7 @@ pub enum Wish {
     Hold,
     /// a held pattern without the energy loop
     RingDown,
-    /// drives off; the start begins anew when the wish changes
+    /// drives off; the start begins anew when the requested mode changes
     Off,
 }
 
@@ -111,7 +111,7 @@ pub struct Observation<T> {
 
 /// What the loops are to do until the next window.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Orders<T> {
+pub enum LoopCommand<T> {
     /// drives off, loops hold
     Rest,
     /// drives off; add the window to the beat
@@ -146,7 +146,7 @@ pub struct SupervisorSettings {
     /// set amplitude a₀, V
     pub amplitude_v: f64,
     /// amplitude above which something vibrates, V
-    pub heard_v: f64,
+    pub detection_threshold_v: f64,
     /// half the width of the swept band, rad/s
     pub band_rad_s: f64,
     /// time of the first sweep, s; each further one takes twice as long
@@ -162,13 +162,13 @@ pub struct SupervisorSettings {
     /// longest time without a measurement before a fault, s
     pub coast_s: f64,
     /// longest time with the amplitude, quadrature or phase out of bounds before a fault, s
-    pub endure_s: f64,
+    pub fault_debounce_s: f64,
     /// rest after a fault, s
     pub rest_s: f64,
     /// starts after a fault before the rests become [`LONG_REST`] times as long
     pub retries: u8,
     /// time in operation after which earlier faults are forgotten, s
-    pub forget_s: f64,
+    pub fault_memory_s: f64,
 }
 
 /// The supervisor's configuration.
@@ -178,7 +178,7 @@ pub struct Supervisor<T> {
     /// a quarter and nine quarters of it: half and one and a half times the amplitude
     pub(crate) low_2: T,
     pub(crate) high_2: T,
-    pub(crate) heard_2: T,
+    pub(crate) detection_threshold_2: T,
     pub(crate) band_rad_s: T,
     pub(crate) sweep: u32,
     pub(crate) sweeps: u8,
@@ -202,7 +202,7 @@ pub struct SupervisorState {
     /// the fault it is in, or was in last before it came back
     pub fault: Option<Fault>,
     /// what the user wants
-    pub wish: Wish,
+    pub requested: RequestedMode,
     /// windows in this mode; in whole angle and hold, windows in a row in which all was well
     pub windows: u32,
     /// windows in a row in which the thing waited for was seen
@@ -239,12 +239,12 @@ impl<T: Float> Supervisor<T> {
     ///
     /// # Errors
     /// A setting that is not finite and positive, or a time of more than 2³¹ windows or of less than one; a lock or a spin-up
-    /// too short for what makes it; `heard_v` not below a third of `amplitude_v`.
+    /// too short for what makes it; `detection_threshold_v` not below a third of `amplitude_v`.
     pub fn new(s: &SupervisorSettings) -> Result<Self, ConfigError> {
         let positive = [
             (s.window_s, "window_s"),
             (s.amplitude_v, "amplitude_v"),
-            (s.heard_v, "heard_v"),
+            (s.detection_threshold_v, "detection_threshold_v"),
             (s.band_rad_s, "band_rad_s"),
         ];
         for (value, parameter) in positive {
@@ -252,8 +252,8 @@ impl<T: Float> Supervisor<T> {
                 return Err(ConfigError { parameter, expected: "finite and positive" });
             }
         }
-        if s.heard_v * 3.0 >= s.amplitude_v {
-            return Err(ConfigError { parameter: "heard_v", expected: "below a third of amplitude_v" });
+        if s.detection_threshold_v * 3.0 >= s.amplitude_v {
+            return Err(ConfigError { parameter: "detection_threshold_v", expected: "below a third of amplitude_v" });
         }
         let windows = |time_s: f64, parameter| {
             let count = time_s / s.window_s;
@@ -274,7 +274,7 @@ impl<T: Float> Supervisor<T> {
             set_2: T::from_f64(s.amplitude_v * s.amplitude_v),
             low_2: T::from_f64(0.25 * s.amplitude_v * s.amplitude_v),
             high_2: T::from_f64(2.25 * s.amplitude_v * s.amplitude_v),
-            heard_2: T::from_f64(s.heard_v * s.heard_v),
+            detection_threshold_2: T::from_f64(s.detection_threshold_v * s.detection_threshold_v),
             band_rad_s: T::from_f64(s.band_rad_s),
             sweep: windows(s.sweep_s, "sweep_s")?,
             sweeps: s.sweeps,
@@ -282,10 +282,10 @@ impl<T: Float> Supervisor<T> {
             lock: windows(s.lock_s, "lock_s")?,
             spin_up: windows(s.spin_up_s, "spin_up_s")?,
             coast: windows(s.coast_s, "coast_s")?,
-            endure: windows(s.endure_s, "endure_s")?,
+            endure: windows(s.fault_debounce_s, "fault_debounce_s")?,
             rest: windows(s.rest_s, "rest_s")?,
             retries: s.retries,
-            forget: windows(s.forget_s, "forget_s")?,
+            forget: windows(s.fault_memory_s, "fault_memory_s")?,
             budget: 0,
         };
         supervisor.budget = supervisor.longest_start();
@@ -326,8 +326,8 @@ impl SupervisorState {
     }
 }
 
-impl Wish {
-    /// The wish that whole angle or hold fulfils.
+impl RequestedMode {
+    /// The request that whole angle or hold fulfils.
     #[inline]
     fn of(mode: Mode) -> Self {
         match mode {

@@ -38,7 +38,7 @@ pub mod state;
 mod step;
 
 pub use continuity::Continuity;
-pub use cvg_controller::{Fault, Heading, Mode, Wish};
+pub use cvg_controller::{Fault, Heading, Mode, RequestedMode};
 pub use settings::{ConfigError, Settings, Tuning};
 pub use state::{Seen, State, Status};
 

@@ -86,7 +86,7 @@ pub struct Settings<'a> {
     /// the fastest precession that is no jump, rad/s
     pub fastest_rad_s: f64,
     /// amplitude above which something vibrates, V
-    pub heard_v: f64,
+    pub detection_threshold_v: f64,
     /// time of the first sweep, s
     pub sweep_s: f64,
     /// readout effects that are undone; not those that are told by the time of a recording: of its clock the electronics
@@ -116,7 +116,7 @@ impl Default for Settings<'_> {
             rate: tuning(2.0, 1.0),
             hold_rad: 0.0,
             fastest_rad_s: 35.0,
-            heard_v: 0.02,
+            detection_threshold_v: 0.02,
             sweep_s: 0.4,
             readout: &[],
             actuation: &[],
@@ -172,7 +172,7 @@ impl Settings<'_> {
         SupervisorSettings {
             window_s: self.window_s(),
             amplitude_v: self.amplitude_v,
-            heard_v: self.heard_v,
+            detection_threshold_v: self.detection_threshold_v,
             band_rad_s: TAU * self.carrier_hz * self.band,
             sweep_s: self.sweep_s,
             sweeps: 3,
@@ -180,10 +180,10 @@ impl Settings<'_> {
             lock_s: 1.0,
             spin_up_s: 5.0,
             coast_s: 0.1,
-            endure_s: 0.3,
+            fault_debounce_s: 0.3,
             rest_s: 0.5,
             retries: 3,
-            forget_s: 10.0,
+            fault_memory_s: 10.0,
         }
     }
 }
@@ -234,7 +234,8 @@ impl<T: Float> Instrument<T> {
         let phase = PhaseLock::new(t(TAU * s.phase.bandwidth_hz), t(s.phase.damping), t(window_s), t(limit_rad_s))?;
         let hold_s = 0.5 * window_s;
         let lead_s = s.group_delay_s() + s.drive_delay_s + hold_s;
-        let precession = Precession::new(window_s, 16.0 * window_s, s.fastest_rad_s, 0.1, lead_s, 0.2 * s.heard_v)?;
+        let precession =
+            Precession::new(window_s, 16.0 * window_s, s.fastest_rad_s, 0.1, lead_s, 0.2 * s.detection_threshold_v)?;
         refuse_another_days_clock(s.readout)?;
         let mut effects = [(EffectId::DetectionGainMismatch, [T::zero(); MAX_PARAMETERS]); MOST_COMPENSATED];
         let readout = converted(s.readout, &mut effects)?;

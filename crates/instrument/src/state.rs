@@ -1,6 +1,6 @@
 //! What an instrument remembers between samples, and what it tells.
 
-use cvg_controller::{Fault, Mode, PiState, SupervisorState, Wish};
+use cvg_controller::{Fault, Mode, PiState, RequestedMode, SupervisorState};
 use cvg_estimator::{Beat, LockState, Phasor, PrecessionState, Window};
 use cvg_model::{AxisForces, Envelope, Float};
 
@@ -92,8 +92,8 @@ impl<T: Float> Default for Seen<T> {
 
 impl<T: Float> State<T> {
     /// What is wanted from the next control step on.
-    pub fn wish(&mut self, wish: Wish) {
-        self.supervisor.wish = wish;
+    pub fn request(&mut self, requested: RequestedMode) {
+        self.supervisor.requested = requested;
     }
 
     /// The last fault, also after the instrument came back from it.

@@ -1,6 +1,6 @@
 //! The step: a sample, and every N samples the control step.
 
-use cvg_controller::supervisor::{self, Observation, Orders};
+use cvg_controller::supervisor::{self, LoopCommand, Observation};
 use cvg_controller::{Mode, OrbitCommands, PiState, Supervisor, SupervisorState};
 use cvg_estimator::beat::phase_ahead;
 use cvg_estimator::direction::major_axis_of;
@@ -87,7 +87,7 @@ impl<T: Float> Instrument<T> {
         let usual = window.clipped == 0 && unlike(&now, &state.fingerprint);
         let readout = match self.demodulator.envelope(&window, &state.phasor) {
             Some(readout) if usual => readout,
-            _ => return self.last_otherwise(state, x, y, cos, sin),
+            _ => return self.end_window_suspect(state, x, y, cos, sin),
         };
         state.fingerprint = now;
         state.seen.readout = readout;
@@ -98,13 +98,13 @@ impl<T: Float> Instrument<T> {
                 None => return self.last_at_its_moment(state, inverse, cos, sin),
             },
         };
-        self.go_on(state, vibration, cos, sin)
+        self.control_fast(state, vibration, cos, sin)
     }
 
     /// The last sample of a window without an envelope, or with one that is to be suspected.
     #[cold]
     #[inline(never)]
-    fn last_otherwise(&self, state: &mut State<T>, x: T, y: T, cos: T, sin: T) -> (T, T, Status) {
+    fn end_window_suspect(&self, state: &mut State<T>, x: T, y: T, cos: T, sin: T) -> (T, T, Status) {
         let window = Window { last: (x, y), ..state.window };
         let measured = self.demodulator.finish(&window, &state.phasor);
         let valid = measured.status == Measured::Valid;
@@ -115,7 +115,7 @@ impl<T: Float> Instrument<T> {
             Some(inverse) if valid => inverse.apply_at(measured.envelope, || self.moment(state)),
             _ => measured.envelope,
         };
-        self.otherwise(state, Suspicion { spoilt: !valid, clipped: measured.clipped > 0, repeats }, cos, sin)
+        self.control_checked(state, Suspicion { spoilt: !valid, clipped: measured.clipped > 0, repeats }, cos, sin)
     }
 
     /// The last sample of a window whose readout is compensated by effects that depend on the moment.
@@ -128,15 +128,15 @@ impl<T: Float> Instrument<T> {
         sin: T,
     ) -> (T, T, Status) {
         let vibration = inverse.apply(state.seen.readout, &self.moment(state));
-        self.go_on(state, vibration, cos, sin)
+        self.control_fast(state, vibration, cos, sin)
     }
 
     /// The control step after a window with nothing to be suspected, and what is put out.
     #[inline(always)]
-    fn go_on(&self, state: &mut State<T>, vibration: Envelope<T>, cos: T, sin: T) -> (T, T, Status) {
+    fn control_fast(&self, state: &mut State<T>, vibration: Envelope<T>, cos: T, sin: T) -> (T, T, Status) {
         state.seen.compensated = vibration;
         let p = vibration.pendulum();
-        if self.supervisor.goes_on(&state.supervisor, &p) {
+        if self.supervisor.runs_unchanged(&state.supervisor, &p) {
             if state.supervisor.mode != self.shortest {
                 return self.go_on_in_full(state, cos, sin);
             }
@@ -144,7 +144,7 @@ impl<T: Float> Instrument<T> {
                 return out;
             }
         }
-        self.otherwise(state, Suspicion::default(), cos, sin)
+        self.control_checked(state, Suspicion::default(), cos, sin)
     }
 
     /// Where the rate loop runs as well, or a phase of the drives is undone.
@@ -153,7 +153,7 @@ impl<T: Float> Instrument<T> {
         let e = state.seen.compensated;
         match self.steadily::<true>(state, &e, &e.pendulum(), cos, sin) {
             Some(out) => out,
-            None => self.otherwise(state, Suspicion::default(), cos, sin),
+            None => self.control_checked(state, Suspicion::default(), cos, sin),
         }
     }
 
@@ -223,7 +223,7 @@ impl<T: Float> Instrument<T> {
     /// The control step at every window, with the envelopes that `state.seen` has, and what is put out.
     #[cold]
     #[inline(never)]
-    fn otherwise(&self, state: &mut State<T>, suspicion: Suspicion, cos: T, sin: T) -> (T, T, Status) {
+    fn control_checked(&self, state: &mut State<T>, suspicion: Suspicion, cos: T, sin: T) -> (T, T, Status) {
         state.status = self.control(state, suspicion);
         let (x, y) = put_out(self.dac_limit_v, &state.drive, cos, sin);
         (x, y, Status { fresh: true, ..state.status })
@@ -252,8 +252,8 @@ impl<T: Float> Instrument<T> {
             }
             _ => None,
         };
-        let orders = self.supervisor.step(&mut state.supervisor, &observation, beat);
-        self.obey(state, orders, &compensated, &pendulum);
+        let command = self.supervisor.step(&mut state.supervisor, &observation, beat);
+        self.apply(state, command, &compensated, &pendulum);
         state.windows = state.windows.wrapping_add(1);
         state.phasor = self.oscillator.tune(&state.phasor, state.seen.correction_rad_s);
         state.window = Window::begin(&state.phasor);
@@ -271,10 +271,10 @@ impl<T: Float> Instrument<T> {
         Status { mode, fault, fresh: false, clipped, valid, half_turns_lost: state.continuity.lost }
     }
 
-    /// Runs the loops that `orders` ask for, and sets the drives and the oscillator.
+    /// Runs the loops that `command` ask for, and sets the drives and the oscillator.
     #[inline]
-    fn obey(&self, state: &mut State<T>, orders: Orders<T>, e: &Envelope<T>, p: &Pendulum<T>) {
-        if let Orders::Run { hold, ring_down } = orders {
+    fn apply(&self, state: &mut State<T>, command: LoopCommand<T>, e: &Envelope<T>, p: &Pendulum<T>) {
+        if let LoopCommand::Run { hold, ring_down } = command {
             let v_as = if ring_down {
                 T::zero()
             } else {
@@ -291,35 +291,35 @@ impl<T: Float> Instrument<T> {
             let seen = &mut state.seen;
             (seen.v_as, seen.v_qc, seen.v_qs, seen.correction_rad_s) = (v_as, v_qc, v_qs, correction_rad_s);
         } else {
-            self.obey_otherwise(state, orders, *e, *p);
+            self.apply_startup_command(state, command, *e, *p);
         }
     }
 
     /// What is seldom, by value: what nobody else wants in memory is put there by this call alone.
     #[cold]
     #[inline(never)]
-    fn obey_otherwise(&self, state: &mut State<T>, orders: Orders<T>, e: Envelope<T>, p: Pendulum<T>) {
+    fn apply_startup_command(&self, state: &mut State<T>, command: LoopCommand<T>, e: Envelope<T>, p: Pendulum<T>) {
         let (e, p) = (&e, &p);
         let zero = T::zero();
         state.drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
         let limit_rad_s = self.oscillator.limit_rad_s();
-        let mut correction_rad_s = ordered(&orders, &state.lock, &state.beat, self.per_window_s, limit_rad_s);
-        match orders {
-            Orders::Rest | Orders::Listen | Orders::Run { .. } => {}
-            Orders::Sweep { opposed, .. } => {
+        let mut correction_rad_s = ordered(&command, &state.lock, &state.beat, self.per_window_s, limit_rad_s);
+        match command {
+            LoopCommand::Rest | LoopCommand::Listen | LoopCommand::Run { .. } => {}
+            LoopCommand::Sweep { opposed, .. } => {
                 let v = self.sweep_v;
                 let forces = AxisForces { x_c: zero, x_s: v, y_c: zero, y_s: if opposed { -v } else { v } };
                 state.drive = self.delay.undone(&forces, correction_rad_s);
             }
-            Orders::Tune => {
+            LoopCommand::Tune => {
                 self.forget(state);
                 state.lock = LockState { detuning_rad_s: correction_rad_s };
             }
-            Orders::Snap => {
+            LoopCommand::Snap => {
                 let (cos, sin) = phase_ahead(e);
                 state.phasor = state.phasor.turned(cos, sin);
             }
-            Orders::Lock => correction_rad_s = self.phase.step(&mut state.lock, p).rad_s,
+            LoopCommand::Lock => correction_rad_s = self.phase.step(&mut state.lock, p).rad_s,
         }
         if !matches!(state.supervisor.mode, Mode::Listen) {
             state.beat = Beat::default();

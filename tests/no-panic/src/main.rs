@@ -89,7 +89,7 @@ macro_rules! steps {
             #[no_panic]
             #[inline(never)]
             pub fn supervisor(c: &Supervisor<T>, s: &mut SupervisorState, o: &Observation<T>, b: Option<Heard<T>>) -> bool {
-                matches!(c.step(s, o, b), cvg_controller::Orders::Rest)
+                matches!(c.step(s, o, b), cvg_controller::LoopCommand::Rest)
             }
 
             #[no_panic]
@@ -146,7 +146,7 @@ macro_rules! steps {
                 let supervisor_settings = cvg_controller::SupervisorSettings {
                     window_s: 1e-3,
                     amplitude_v: 1.0,
-                    heard_v: 0.1,
+                    detection_threshold_v: 0.1,
                     band_rad_s: 1.0,
                     sweep_s: 1.0,
                     sweeps: 3,
@@ -154,10 +154,10 @@ macro_rules! steps {
                     lock_s: 0.1,
                     spin_up_s: 0.1,
                     coast_s: 0.1,
-                    endure_s: 0.1,
+                    fault_debounce_s: 0.1,
                     rest_s: 0.1,
                     retries: 3,
-                    forget_s: 1.0,
+                    fault_memory_s: 1.0,
                 };
                 let watch = black_box(Supervisor::<T>::new(&supervisor_settings)?);
                 let mut watched = black_box(SupervisorState::default());

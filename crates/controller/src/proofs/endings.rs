@@ -6,7 +6,7 @@ use cvg_model::Float;
 use kani::Arbitrary;
 
 use super::supervisor::{any_beat, any_observation, any_state, any_supervisor};
-use crate::supervisor::{Fault, MOST_COASTS, Mode, Observation, Supervisor, SupervisorState, Wish};
+use crate::supervisor::{Fault, MOST_COASTS, Mode, Observation, RequestedMode, Supervisor, SupervisorState};
 
 fn in_operation(mode: Mode) -> bool {
     matches!(mode, Mode::WholeAngle | Mode::Hold | Mode::RingDown)
@@ -21,7 +21,7 @@ fn starts_end<T: Float + Arbitrary>(fall: u32) {
     let supervisor = any_supervisor::<T>();
     let before = any_state();
     // precondition: an instrument that is to be on
-    kani::assume(before.wish != Wish::Off);
+    kani::assume(before.requested != RequestedMode::Off);
     // precondition: a fault has a name, as after every step
     kani::assume(before.mode != Mode::Fault || before.fault.is_some());
     let mut state = before;
@@ -101,7 +101,7 @@ fn nothing_is_walked_around<T: Float + Arbitrary>(slack: u32) {
     let supervisor = any_supervisor::<T>();
     let before = any_state();
     // precondition: an instrument that is to be on
-    kani::assume(before.wish != Wish::Off);
+    kani::assume(before.requested != RequestedMode::Off);
     // precondition: not at the end of what can be counted, which is beyond every fault's time
     kani::assume(before.bad < u32::MAX && before.clipped < u32::MAX && before.coasts < u8::MAX);
     let mut state = before;
@@ -122,7 +122,7 @@ fn nothing_is_walked_around<T: Float + Arbitrary>(slack: u32) {
         }
         if in_operation(before.mode) && starting(state.mode) {
             kani::cover!(true, "out of operation");
-            // by the wish for another mode, or counted
+            // by a request for another mode, or counted
             assert!(state.coasts == before.coasts + 1 || (state.mode == Mode::SpinUp && state.trying == 0));
             assert!(state.coasts <= MOST_COASTS || state.mode == Mode::SpinUp);
         }
@@ -141,7 +141,7 @@ fn nothing_is_walked_around<T: Float + Arbitrary>(slack: u32) {
 }
 
 //= specs/dsp.md#faults-cannot-be-walked-around
-//# A window out of bounds MUST be counted until a fault is named, rest is wished, or all was well for the time that is endured.
+//# A window out of bounds MUST be counted until a fault is named, rest is requested, or all was well for the time that is endured.
 /// [`Supervisor::step`], from any state and for any observation and beat, takes nothing back of the windows that were out of
 /// bounds or clipped but after the time that is endured, nor of the interruptions but after the time to forget, in which
 /// all was well; it counts each departure from operation, and each window of an amplitude or a quadrature out of bounds that leaves
@@ -161,7 +161,7 @@ pub fn twin_nothing_is_walked_around_f32() {
 }
 
 //= specs/dsp.md#faults-cannot-be-walked-around
-//# A window out of bounds MUST be counted until a fault is named, rest is wished, or all was well for the time that is endured.
+//# A window out of bounds MUST be counted until a fault is named, rest is requested, or all was well for the time that is endured.
 /// [`Supervisor::step`], from any state and for any observation and beat, takes nothing back of the windows that were out of
 /// bounds or clipped but after the time that is endured, nor of the interruptions but after the time to forget, in which
 /// all was well; it counts each departure from operation, and each window of an amplitude or a quadrature out of bounds that leaves

@@ -8,7 +8,7 @@ use kani::Arbitrary;
 use super::allocation::any_allocation;
 use super::pi::any_controller;
 use super::supervisor::{any_state, any_supervisor};
-use crate::supervisor::{Mode, Observation, Orders, SupervisorState};
+use crate::supervisor::{LoopCommand, Mode, Observation, SupervisorState};
 use crate::{Allocation, OrbitCommands, PiState, Status};
 
 /// The same to the last bit, or both no number. The conversion is exact.
@@ -64,25 +64,25 @@ fn supervision_is_the_same<T: Float + Arbitrary>(windows: impl Fn(&SupervisorSta
     let before = any_state();
     let pendulum =
         cvg_model::Pendulum { e: kani::any(), q: kani::any(), r: kani::any(), s: kani::any(), l: kani::any() };
-    let goes_on = supervisor.goes_on(&before, &pendulum);
+    let runs_unchanged = supervisor.runs_unchanged(&before, &pendulum);
     let (mut short, mut long) = (before, before);
     short.count();
     let well = Observation { pendulum, valid: true, clipped: false, repeats: false, jumped: false };
-    let orders = supervisor.step(&mut long, &well, None);
-    kani::cover!(goes_on && before.mode == Mode::Hold, "a hold goes on");
-    kani::cover!(goes_on && before.bad > 0, "what was counted stays so");
-    kani::cover!(!goes_on && before.mode == Mode::WholeAngle, "the long way");
-    if goes_on {
+    let command = supervisor.step(&mut long, &well, None);
+    kani::cover!(runs_unchanged && before.mode == Mode::Hold, "a hold goes on");
+    kani::cover!(runs_unchanged && before.bad > 0, "what was counted stays so");
+    kani::cover!(!runs_unchanged && before.mode == Mode::WholeAngle, "the long way");
+    if runs_unchanged {
         kani::cover!(before.windows == u32::MAX, "at the end of what can be counted");
         assert!(long == short && long.windows == windows(&short));
-        assert!(orders == Orders::Run { hold: before.mode == Mode::Hold, ring_down: false });
+        assert!(command == LoopCommand::Run { hold: before.mode == Mode::Hold, ring_down: false });
         assert!(crate::Supervisor::in_phase(&pendulum));
     }
 }
 
 //= specs/dsp.md#short-way
 //# The short way of nearly every control step MUST leave the state and the outputs that the way of all control steps leaves but for the sign of zero.
-/// Where [`Supervisor::goes_on`] says so, [`Supervisor::step`] after a window of which nothing is amiss gives the orders of
+/// Where [`Supervisor::runs_unchanged`] says so, [`Supervisor::step`] after a window of which nothing is amiss gives the command of
 /// the mode, counts the window and changes nothing else, and the phase is near: for any supervisor, state and vibration.
 #[kani::proof]
 #[kani::solver(minisat)]

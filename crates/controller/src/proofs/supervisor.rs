@@ -3,7 +3,7 @@
 use cvg_model::{Float, Pendulum};
 use kani::Arbitrary;
 
-use crate::supervisor::{Beat, Fault, Mode, Observation, Orders, Supervisor, SupervisorState, Wish};
+use crate::supervisor::{Beat, Fault, LoopCommand, Mode, Observation, RequestedMode, Supervisor, SupervisorState};
 
 /// Any supervisor, also such as `new` would refuse.
 pub(super) fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
@@ -11,7 +11,7 @@ pub(super) fn any_supervisor<T: Float + Arbitrary>() -> Supervisor<T> {
         set_2: kani::any(),
         low_2: kani::any(),
         high_2: kani::any(),
-        heard_2: kani::any(),
+        detection_threshold_2: kani::any(),
         band_rad_s: kani::any(),
         sweep: kani::any(),
         sweeps: kani::any(),
@@ -57,11 +57,11 @@ pub(super) fn any_state() -> SupervisorState {
             _ => Mode::Fault,
         },
         fault: any_fault(),
-        wish: match kani::any::<u8>() % 4 {
-            0 => Wish::WholeAngle,
-            1 => Wish::Hold,
-            2 => Wish::RingDown,
-            _ => Wish::Off,
+        requested: match kani::any::<u8>() % 4 {
+            0 => RequestedMode::WholeAngle,
+            1 => RequestedMode::Hold,
+            2 => RequestedMode::RingDown,
+            _ => RequestedMode::Off,
         },
         windows: kani::any(),
         good: kani::any(),
@@ -97,24 +97,24 @@ fn supervisor_is_total<T: Float + Arbitrary>(kept: impl Fn(&Observation<T>) -> b
     // precondition: a fault has a name, as after every step
     kani::assume(state.mode != Mode::Fault || state.fault.is_some());
     let o = any_observation();
-    let orders = supervisor.step(&mut state, &o, any_beat());
-    kani::cover!(state.mode == Mode::WholeAngle && orders != Orders::Rest, "in operation");
+    let command = supervisor.step(&mut state, &o, any_beat());
+    kani::cover!(state.mode == Mode::WholeAngle && command != LoopCommand::Rest, "in operation");
     kani::cover!(state.fault == Some(Fault::DeadChannel) && state.mode == Mode::Fault, "a fault");
-    kani::cover!(matches!(orders, Orders::Sweep { .. }), "a sweep");
+    kani::cover!(matches!(command, LoopCommand::Sweep { .. }), "a sweep");
     if state.mode == Mode::Fault {
         kani::cover!(true, "in a fault");
-        assert!(state.fault.is_some() && orders == Orders::Rest);
+        assert!(state.fault.is_some() && command == LoopCommand::Rest);
     }
-    if state.wish == Wish::Off || !kept(&o) {
+    if state.requested == RequestedMode::Off || !kept(&o) {
         kani::cover!(state.mode != Mode::Fault, "at rest without a fault");
-        assert!(orders == Orders::Rest);
+        assert!(command == LoopCommand::Rest);
     }
 }
 
 //= specs/dsp.md#whole-step
 //# The state at power-on MUST be within its bounds, and a step from a state within them MUST leave one within them.
 /// [`Supervisor::step`] does not panic or overflow for any state, observation and beat; a fault keeps its name and the
-/// drives off; an invalid window and the wish for rest turn them off.
+/// drives off; an invalid window and a request for rest turn them off.
 #[kani::proof]
 #[kani::solver(minisat)]
 pub fn proof_supervisor_is_total_f32() {

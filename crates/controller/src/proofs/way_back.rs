@@ -6,7 +6,7 @@ use cvg_model::{Float, Pendulum};
 use kani::Arbitrary;
 
 use super::supervisor::{any_state, any_supervisor};
-use crate::supervisor::{Beat, ENOUGH, LONG_REST, Mode, Observation, Supervisor, SupervisorState, Wish};
+use crate::supervisor::{Beat, ENOUGH, LONG_REST, Mode, Observation, RequestedMode, Supervisor, SupervisorState};
 
 /// Windows of a lock, of which the first sets the phase, and of a spin-up.
 const LOCKED: u64 = ENOUGH as u64 + 1;
@@ -50,7 +50,7 @@ fn the_way_back_ends<T: Float + Arbitrary>(fall: u64) {
         set_2: T::one(),
         low_2: T::ratio(1, 4),
         high_2: T::ratio(9, 4),
-        heard_2: T::ratio(1, 64),
+        detection_threshold_2: T::ratio(1, 64),
         band_rad_s: T::one(),
         ..any_supervisor::<T>()
     };
@@ -63,7 +63,7 @@ fn the_way_back_ends<T: Float + Arbitrary>(fall: u64) {
     kani::assume(supervisor.lock > ENOUGH + 1 && supervisor.spin_up > ENOUGH + 1);
     let mut state = any_state();
     // precondition: an instrument that is to be on
-    kani::assume(state.wish != Wish::Off);
+    kani::assume(state.requested != RequestedMode::Off);
     let before = left(&supervisor, &state);
     let was = state.mode;
     supervisor.step(&mut state, &o, beat);

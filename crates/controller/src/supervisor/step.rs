@@ -1,9 +1,10 @@
-//! The supervisor's step: a window in, orders out.
+//! The supervisor's step: a window in, command out.
 
 use cvg_model::{Float, Pendulum};
 
 use super::{
-    Beat, ENOUGH, Fault, LONG_REST, MOST_COASTS, Mode, Observation, Orders, STUCK, Supervisor, SupervisorState, Wish,
+    Beat, ENOUGH, Fault, LONG_REST, LoopCommand, MOST_COASTS, Mode, Observation, RequestedMode, STUCK, Supervisor,
+    SupervisorState,
 };
 
 impl<T: Float> Supervisor<T> {
@@ -11,10 +12,11 @@ impl<T: Float> Supervisor<T> {
     //# An instrument at rest MUST reach whole-angle mode or end in a fault with a name.
     //= specs/dsp.md#recovery
     //# After a fault the instrument MUST be in whole-angle mode again or in a fault with a name within the stated time.
-    /// The orders for the window to come, after the window `o`. Total.
-    pub fn step(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
+    /// The command for the window to come, after the window `o`. Total.
+    pub fn step(&self, state: &mut SupervisorState, o: &Observation<T>, beat: Option<Beat<T>>) -> LoopCommand<T> {
         state.count();
-        let running = matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.wish == Wish::of(state.mode);
+        let running =
+            matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.requested == RequestedMode::of(state.mode);
         let well = o.valid && !(o.clipped || o.repeats || o.jumped);
         if running && well && self.within_bounds(&o.pendulum) {
             state.repeats = 0;
@@ -24,11 +26,12 @@ impl<T: Float> Supervisor<T> {
             if state.windows >= self.forget {
                 (state.starts, state.coasts, state.cause, state.trying) = (0, 0, None, 0);
             }
-            return Orders::Run { hold: state.mode == Mode::Hold, ring_down: false };
+            return LoopCommand::Run { hold: state.mode == Mode::Hold, ring_down: false };
         }
-        if state.wish == Wish::Off {
-            *state = SupervisorState { wish: Wish::Off, fault: state.fault, ..SupervisorState::default() };
-            return Orders::Rest;
+        if state.requested == RequestedMode::Off {
+            *state =
+                SupervisorState { requested: RequestedMode::Off, fault: state.fault, ..SupervisorState::default() };
+            return LoopCommand::Rest;
         }
         state.repeats = if o.repeats { state.repeats.saturating_add(1) } else { 0 };
         if state.mode == Mode::Fault {
@@ -54,7 +57,7 @@ impl<T: Float> Supervisor<T> {
             Mode::SpinUp => self.spin_up(state, o),
             Mode::WholeAngle | Mode::Hold | Mode::RingDown => self.operate(state, o),
             Mode::Coast => self.coast(state, o),
-            Mode::Fault => Orders::Rest,
+            Mode::Fault => LoopCommand::Rest,
         }
     }
 
@@ -78,16 +81,16 @@ impl<T: Float> Supervisor<T> {
     /// Whether all that [`Supervisor::step`] does after a window with the pendulum variables `p`, of which nothing else is
     /// amiss, is to [count](SupervisorState::count) it: whole angle or hold goes on as it is.
     #[inline(always)]
-    pub fn goes_on(&self, state: &SupervisorState, p: &Pendulum<T>) -> bool {
-        let as_wished = match state.mode {
-            Mode::WholeAngle => state.wish == Wish::WholeAngle,
-            Mode::Hold => state.wish == Wish::Hold,
+    pub fn runs_unchanged(&self, state: &SupervisorState, p: &Pendulum<T>) -> bool {
+        let as_requested = match state.mode {
+            Mode::WholeAngle => state.requested == RequestedMode::WholeAngle,
+            Mode::Hold => state.requested == RequestedMode::Hold,
             _ => false,
         };
         let next = state.windows.saturating_add(1);
         // one branch for all three; what was out of bounds stays counted, untouched, until it is forgotten
         let counted = state.bad | state.repeats | state.clipped;
-        as_wished
+        as_requested
             && (counted == 0 || (state.repeats == 0 && next < self.endure))
             && (next < self.forget || state.forgotten())
             && p.e > self.low_2
@@ -107,13 +110,13 @@ impl<T: Float> Supervisor<T> {
         p.e > self.low_2 && p.e < self.high_2 && p.q.magnitude() < bound && p.l.magnitude() < bound
     }
 
-    fn listen(&self, state: &mut SupervisorState, beat: Option<Beat<T>>) -> Orders<T> {
+    fn listen(&self, state: &mut SupervisorState, beat: Option<Beat<T>>) -> LoopCommand<T> {
         if state.windows < self.listen {
-            return Orders::Listen;
+            return LoopCommand::Listen;
         }
-        let Some(beat) = beat else { return Orders::Listen };
+        let Some(beat) = beat else { return LoopCommand::Listen };
         let sum = beat.x2 + beat.y2;
-        let heard = sum > T::ratio(beat.windows, 1) * self.heard_2;
+        let heard = sum > T::ratio(beat.windows, 1) * self.detection_threshold_2;
         if heard {
             let faint = sum * T::ratio(1, 400);
             // a line along an axis looks like a dead channel, but not after a sweep that drives both
@@ -122,36 +125,36 @@ impl<T: Float> Supervisor<T> {
                 if state.sweeps >= self.sweeps {
                     return fail(state, Fault::DeadChannel);
                 }
-                return enter(state, Mode::Sweep, Orders::Rest);
+                return enter(state, Mode::Sweep, LoopCommand::Rest);
             }
-            return enter(state, Mode::Lock, Orders::Tune);
+            return enter(state, Mode::Lock, LoopCommand::Tune);
         }
         if state.sweeps >= self.sweeps {
             return fail(state, Fault::NoResonance);
         }
-        enter(state, Mode::Sweep, Orders::Rest)
+        enter(state, Mode::Sweep, LoopCommand::Rest)
     }
 
-    fn sweep(&self, state: &mut SupervisorState) -> Orders<T> {
+    fn sweep(&self, state: &mut SupervisorState) -> LoopCommand<T> {
         let length = self.sweep_length(state.sweeps);
         if state.windows >= length {
             state.sweeps = state.sweeps.saturating_add(1);
-            return enter(state, Mode::Listen, Orders::Rest);
+            return enter(state, Mode::Listen, LoopCommand::Rest);
         }
         let share = count::<T>(state.windows) / count::<T>(length);
-        Orders::Sweep {
+        LoopCommand::Sweep {
             correction_rad_s: self.band_rad_s * (T::two() * share - T::one()),
             opposed: state.sweeps % 2 == 1,
         }
     }
 
-    fn lock(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
+    fn lock(&self, state: &mut SupervisorState, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
-        if p.e * T::ratio(4, 1) < self.heard_2 {
-            return enter(state, Mode::Listen, Orders::Rest);
+        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {
+            return enter(state, Mode::Listen, LoopCommand::Rest);
         }
         if state.windows == 1 {
-            return Orders::Snap;
+            return LoopCommand::Snap;
         }
         if p.l.magnitude() < T::ratio(1, 5) * p.e {
             state.good = state.good.saturating_add(1);
@@ -159,17 +162,17 @@ impl<T: Float> Supervisor<T> {
             state.good = 0;
         }
         if state.good >= ENOUGH {
-            return enter(state, Mode::SpinUp, Orders::Run { hold: false, ring_down: false });
+            return enter(state, Mode::SpinUp, LoopCommand::Run { hold: false, ring_down: false });
         }
         if state.windows >= self.lock {
             return fail(state, Fault::NoLock);
         }
-        Orders::Lock
+        LoopCommand::Lock
     }
 
-    fn spin_up(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
+    fn spin_up(&self, state: &mut SupervisorState, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
-        if p.e * T::ratio(4, 1) < self.heard_2 {
+        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {
             return fail(state, named(o, Fault::AmplitudeLow));
         }
         let off = (p.e - self.set_2).magnitude();
@@ -184,57 +187,57 @@ impl<T: Float> Supervisor<T> {
             if state.cause == Some(Fault::DeadChannel) && p.s.magnitude() < T::ratio(1, 30) * p.r.magnitude() {
                 return fail(state, Fault::DeadChannel);
             }
-            let mode = match state.wish {
-                Wish::Hold => Mode::Hold,
-                Wish::RingDown => Mode::RingDown,
-                Wish::WholeAngle | Wish::Off => Mode::WholeAngle,
+            let mode = match state.requested {
+                RequestedMode::Hold => Mode::Hold,
+                RequestedMode::RingDown => Mode::RingDown,
+                RequestedMode::WholeAngle | RequestedMode::Off => Mode::WholeAngle,
             };
-            return enter(state, mode, orders(mode));
+            return enter(state, mode, command(mode));
         }
         // on its way up an amplitude may be low
-        if let Some(orders) = self.out_of_bounds(state, p, false) {
-            return orders;
+        if let Some(command) = self.out_of_bounds(state, p, false) {
+            return command;
         }
         if state.windows >= self.spin_up {
             return fail(state, Fault::NoSpinUp);
         }
-        Orders::Run { hold: state.wish != Wish::WholeAngle, ring_down: false }
+        LoopCommand::Run { hold: state.requested != RequestedMode::WholeAngle, ring_down: false }
     }
 
-    fn operate(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
+    fn operate(&self, state: &mut SupervisorState, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
         if o.jumped {
             return interrupted(state, named(o, Fault::DeadChannel));
         }
-        if p.e * T::ratio(4, 1) < self.heard_2 {
+        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {
             return fail(state, named(o, Fault::AmplitudeLow));
         }
-        let wished = match state.wish {
-            Wish::Hold => Mode::Hold,
-            Wish::RingDown => Mode::RingDown,
-            Wish::WholeAngle | Wish::Off => Mode::WholeAngle,
+        let requested = match state.requested {
+            RequestedMode::Hold => Mode::Hold,
+            RequestedMode::RingDown => Mode::RingDown,
+            RequestedMode::WholeAngle | RequestedMode::Off => Mode::WholeAngle,
         };
         let low = p.e < self.low_2;
-        if wished != state.mode {
+        if requested != state.mode {
             // after a ring-down the amplitude has to come back first: a start of its own
-            let next = if low { Mode::SpinUp } else { wished };
+            let next = if low { Mode::SpinUp } else { requested };
             state.trying = 0;
-            return enter(state, next, orders(next));
+            return enter(state, next, command(next));
         }
-        if let Some(orders) = self.out_of_bounds(state, p, low && state.mode != Mode::RingDown) {
-            return orders;
+        if let Some(command) = self.out_of_bounds(state, p, low && state.mode != Mode::RingDown) {
+            return command;
         }
         if state.mode != Mode::RingDown {
             // not all was well in this window
             state.windows = 0;
         }
-        orders(state.mode)
+        command(state.mode)
     }
 
     //= specs/dsp.md#faults-cannot-be-walked-around
-    //# A window out of bounds MUST be counted until a fault is named, rest is wished, or all was well for the time that is endured.
+    //# A window out of bounds MUST be counted until a fault is named, rest is requested, or all was well for the time that is endured.
     /// What is to be done about a phase, an amplitude or a quadrature out of bounds.
-    fn out_of_bounds(&self, state: &mut SupervisorState, p: &Pendulum<T>, low: bool) -> Option<Orders<T>> {
+    fn out_of_bounds(&self, state: &mut SupervisorState, p: &Pendulum<T>, low: bool) -> Option<LoopCommand<T>> {
         let bound = T::half() * p.e;
         // each false for NaN
         let (locked, bounded, flat) = (p.l.magnitude() < bound, p.e <= self.high_2, p.q.magnitude() < bound);
@@ -256,30 +259,30 @@ impl<T: Float> Supervisor<T> {
         None
     }
 
-    fn coast(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
+    fn coast(&self, state: &mut SupervisorState, o: &Observation<T>) -> LoopCommand<T> {
         if !o.valid {
             state.good = 0;
             if state.windows >= self.coast {
                 let cause = state.cause.unwrap_or(Fault::InvalidSamples);
                 return fail(state, cause);
             }
-            return Orders::Rest;
+            return LoopCommand::Rest;
         }
         // two windows of a kind: what was in the middle of a window when it happened is past
         state.good = state.good.saturating_add(1);
         if state.good < 2 {
-            return Orders::Rest;
+            return LoopCommand::Rest;
         }
-        if o.pendulum.e * T::ratio(4, 1) < self.heard_2 {
-            return enter(state, Mode::Listen, Orders::Rest);
+        if o.pendulum.e * T::ratio(4, 1) < self.detection_threshold_2 {
+            return enter(state, Mode::Listen, LoopCommand::Rest);
         }
-        enter(state, Mode::Lock, Orders::Snap)
+        enter(state, Mode::Lock, LoopCommand::Snap)
     }
 
     //= specs/dsp.md#way-back
     //# From every fault the instrument MUST be in operation within its longest rest and its shortest start once all that it observes is as it should be.
     /// The rest after a fault.
-    fn rest(&self, state: &mut SupervisorState, o: &Observation<T>) -> Orders<T> {
+    fn rest(&self, state: &mut SupervisorState, o: &Observation<T>) -> LoopCommand<T> {
         let cured = o.valid && !o.clipped && state.repeats < STUCK;
         let rest = if state.starts < self.retries { self.rest } else { self.rest.saturating_mul(LONG_REST) };
         if cured && state.windows >= rest {
@@ -288,9 +291,9 @@ impl<T: Float> Supervisor<T> {
             }
             // why it coasted in the last start says nothing of this one: a pattern may lie on an axis by chance
             (state.sweeps, state.clipped, state.trying, state.cause) = (0, 0, 0, None);
-            return enter(state, Mode::Listen, Orders::Rest);
+            return enter(state, Mode::Listen, LoopCommand::Rest);
         }
-        Orders::Rest
+        LoopCommand::Rest
     }
 }
 
@@ -304,13 +307,13 @@ fn count<T: Float>(windows: u32) -> T {
     T::ratio(i32::try_from(windows).unwrap_or(i32::MAX), 1)
 }
 
-fn orders<T>(mode: Mode) -> Orders<T> {
-    Orders::Run { hold: matches!(mode, Mode::Hold | Mode::RingDown), ring_down: mode == Mode::RingDown }
+fn command<T>(mode: Mode) -> LoopCommand<T> {
+    LoopCommand::Run { hold: matches!(mode, Mode::Hold | Mode::RingDown), ring_down: mode == Mode::RingDown }
 }
 
-fn enter<T>(state: &mut SupervisorState, mode: Mode, orders: Orders<T>) -> Orders<T> {
+fn enter<T>(state: &mut SupervisorState, mode: Mode, command: LoopCommand<T>) -> LoopCommand<T> {
     (state.mode, state.windows, state.good) = (mode, 0, 0);
-    orders
+    command
 }
 
 /// The fault by its name: a converter at the end of its range, or one that repeats itself, looks like much else.
@@ -325,14 +328,14 @@ fn named<T>(o: &Observation<T>, fault: Fault) -> Fault {
 }
 
 /// An interruption that is waited out, unless there were too many.
-fn interrupted<T>(state: &mut SupervisorState, cause: Fault) -> Orders<T> {
+fn interrupted<T>(state: &mut SupervisorState, cause: Fault) -> LoopCommand<T> {
     state.cause = Some(cause);
-    if too_many(state) { fail(state, cause) } else { enter(state, Mode::Coast, Orders::Rest) }
+    if too_many(state) { fail(state, cause) } else { enter(state, Mode::Coast, LoopCommand::Rest) }
 }
 
 /// The phase is set anew, unless it was too often.
-fn relocked<T>(state: &mut SupervisorState) -> Orders<T> {
-    if too_many(state) { fail(state, Fault::NoLock) } else { enter(state, Mode::Lock, Orders::Snap) }
+fn relocked<T>(state: &mut SupervisorState) -> LoopCommand<T> {
+    if too_many(state) { fail(state, Fault::NoLock) } else { enter(state, Mode::Lock, LoopCommand::Snap) }
 }
 
 /// Counts an interruption.
@@ -342,8 +345,8 @@ fn too_many(state: &mut SupervisorState) -> bool {
 }
 
 #[cold]
-fn fail<T>(state: &mut SupervisorState, fault: Fault) -> Orders<T> {
+fn fail<T>(state: &mut SupervisorState, fault: Fault) -> LoopCommand<T> {
     state.fault = Some(fault);
     (state.bad, state.coasts, state.trying) = (0, 0, 0);
-    enter(state, Mode::Fault, Orders::Rest)
+    enter(state, Mode::Fault, LoopCommand::Rest)
 }

@@ -47,8 +47,8 @@ fn the_budget_names_what_the_start_was_at() {
     for (mode, name) in names {
         let (after, _) = step(spent(mode, BUDGET - 2), &well());
         assert_eq!((after.mode, after.trying), (mode, BUDGET - 1));
-        let (after, orders) = step(spent(mode, BUDGET - 1), &well());
-        assert_eq!((after.fault_now(), after.trying, orders), (Some(name), 0, Orders::Rest));
+        let (after, command) = step(spent(mode, BUDGET - 1), &well());
+        assert_eq!((after.fault_now(), after.trying, command), (Some(name), 0, LoopCommand::Rest));
     }
     for mode in [Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
         let before = SupervisorState { trying: u32::MAX, ..in_mode(mode, 3) };
@@ -58,7 +58,8 @@ fn the_budget_names_what_the_start_was_at() {
 
 #[test]
 fn a_pattern_that_comes_back_up_after_a_ring_down_has_a_budget_of_its_own() {
-    let before = SupervisorState { wish: Wish::WholeAngle, trying: BUDGET - 1, ..in_mode(Mode::RingDown, 99) };
+    let before =
+        SupervisorState { requested: RequestedMode::WholeAngle, trying: BUDGET - 1, ..in_mode(Mode::RingDown, 99) };
     let (after, _) = step(before, &energy(1.0));
     assert_eq!((after.mode, after.trying), (Mode::SpinUp, 0));
 }
@@ -111,7 +112,7 @@ fn what_is_no_number_is_out_of_bounds() {
         let round = with(|p| p.q = f64::NAN);
         assert_eq!(step(in_mode(mode, 3), &round).0.bad, 1, "{mode:?}");
         for o in [energy(f64::NAN), with(|p| p.l = f64::NAN)] {
-            assert_eq!(becomes(in_mode(mode, 3), &o), (Mode::Lock, None, Orders::Snap), "{mode:?}");
+            assert_eq!(becomes(in_mode(mode, 3), &o), (Mode::Lock, None, LoopCommand::Snap), "{mode:?}");
         }
     }
 }

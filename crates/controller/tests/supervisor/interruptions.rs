@@ -6,8 +6,8 @@ use super::*;
 fn a_window_without_a_measurement_coasts_in_every_mode_and_has_a_cause() {
     let modes = [Mode::Listen, Mode::Sweep, Mode::Lock, Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown];
     for mode in modes {
-        let (after, orders) = step(in_mode(mode, 2), &invalid());
-        assert_eq!((after.mode, after.windows, orders), (Mode::Coast, 0, Orders::Rest));
+        let (after, command) = step(in_mode(mode, 2), &invalid());
+        assert_eq!((after.mode, after.windows, command), (Mode::Coast, 0, LoopCommand::Rest));
         assert_eq!((after.cause, after.coasts), (Some(Fault::InvalidSamples), 1));
     }
 }
@@ -16,8 +16,8 @@ fn a_window_without_a_measurement_coasts_in_every_mode_and_has_a_cause() {
 fn a_pattern_that_jumps_in_operation_coasts_with_a_dead_channel_as_cause() {
     let jumped = Observation { jumped: true, ..well() };
     for mode in [Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
-        let (after, orders) = step(in_mode(mode, FORGET + 5), &jumped);
-        assert_eq!((after.mode, after.cause, orders), (Mode::Coast, Some(Fault::DeadChannel), Orders::Rest));
+        let (after, command) = step(in_mode(mode, FORGET + 5), &jumped);
+        assert_eq!((after.mode, after.cause, command), (Mode::Coast, Some(Fault::DeadChannel), LoopCommand::Rest));
     }
     // a pattern that is not yet controlled may
     assert_eq!(becomes(in_mode(Mode::SpinUp, 2), &jumped), (Mode::SpinUp, None, RUN));
@@ -26,9 +26,9 @@ fn a_pattern_that_jumps_in_operation_coasts_with_a_dead_channel_as_cause() {
 #[test]
 fn the_fifty_first_interruption_is_a_fault() {
     let before = |coasts| SupervisorState { coasts, ..in_mode(Mode::WholeAngle, 2) };
-    assert_eq!(becomes(before(49), &invalid()), (Mode::Coast, None, Orders::Rest));
-    let (after, orders) = step(before(50), &invalid());
-    assert_eq!((after.fault_now(), after.coasts, orders), (Some(Fault::InvalidSamples), 0, Orders::Rest));
+    assert_eq!(becomes(before(49), &invalid()), (Mode::Coast, None, LoopCommand::Rest));
+    let (after, command) = step(before(50), &invalid());
+    assert_eq!((after.fault_now(), after.coasts, command), (Some(Fault::InvalidSamples), 0, LoopCommand::Rest));
 }
 
 #[test]
@@ -36,8 +36,8 @@ fn the_fifty_first_lost_phase_is_a_fault() {
     let lost = with(|p| p.l = 12.5);
     for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
         let before = |coasts| SupervisorState { coasts, cause: Some(Fault::DeadChannel), ..in_mode(mode, 2) };
-        let (after, orders) = step(before(49), &lost);
-        assert_eq!((after.mode, after.coasts, orders), (Mode::Lock, 50, Orders::Snap));
+        let (after, command) = step(before(49), &lost);
+        assert_eq!((after.mode, after.coasts, command), (Mode::Lock, 50, LoopCommand::Snap));
         assert_eq!(after.cause, Some(Fault::DeadChannel), "why it coasted is another matter");
         assert_eq!(becomes(before(50), &lost), fault(Fault::NoLock));
     }
@@ -66,19 +66,19 @@ fn a_converter_at_its_end_and_one_that_repeats_itself_are_named_as_what_they_are
 
 #[test]
 fn two_windows_in_a_row_end_a_coast_in_a_lock_or_in_listening() {
-    let (one, orders) = step(in_mode(Mode::Coast, 2), &well());
-    assert_eq!((one.mode, one.good, orders), (Mode::Coast, 1, Orders::Rest));
+    let (one, command) = step(in_mode(Mode::Coast, 2), &well());
+    assert_eq!((one.mode, one.good, command), (Mode::Coast, 1, LoopCommand::Rest));
     assert_eq!(step(one, &invalid()).0.good, 0);
-    assert_eq!(becomes(one, &well()), (Mode::Lock, None, Orders::Snap));
-    assert_eq!(becomes(one, &energy(LEAST)), (Mode::Lock, None, Orders::Snap));
-    assert_eq!(becomes(one, &energy(0.99 * LEAST)), (Mode::Listen, None, Orders::Rest));
+    assert_eq!(becomes(one, &well()), (Mode::Lock, None, LoopCommand::Snap));
+    assert_eq!(becomes(one, &energy(LEAST)), (Mode::Lock, None, LoopCommand::Snap));
+    assert_eq!(becomes(one, &energy(0.99 * LEAST)), (Mode::Listen, None, LoopCommand::Rest));
 }
 
 #[test]
 fn a_coast_that_lasts_is_the_fault_that_caused_it() {
     let coasting = |cause, windows| SupervisorState { cause, ..in_mode(Mode::Coast, windows) };
     let jumped = Some(Fault::DeadChannel);
-    assert_eq!(becomes(coasting(jumped, COAST - 2), &invalid()), (Mode::Coast, None, Orders::Rest));
+    assert_eq!(becomes(coasting(jumped, COAST - 2), &invalid()), (Mode::Coast, None, LoopCommand::Rest));
     assert_eq!(becomes(coasting(jumped, COAST - 1), &invalid()), fault(Fault::DeadChannel));
     assert_eq!(becomes(coasting(None, COAST - 1), &invalid()), fault(Fault::InvalidSamples));
 }
@@ -117,14 +117,14 @@ fn after_a_rest_the_start_is_tried_again_as_often_as_is_set_and_then_after_long_
     };
     assert_eq!(becomes(fallen(0, REST - 2), &well()), fault(Fault::NoLock));
     for starts in 0..2 {
-        let (after, orders) = step(fallen(starts, REST - 1), &well());
-        assert_eq!((after.mode, after.starts, after.sweeps, orders), (Mode::Listen, starts + 1, 0, Orders::Rest));
+        let (after, command) = step(fallen(starts, REST - 1), &well());
+        assert_eq!((after.mode, after.starts, after.sweeps, command), (Mode::Listen, starts + 1, 0, LoopCommand::Rest));
         assert_eq!((after.fault, after.fault_now()), (Some(Fault::NoLock), None), "it is remembered, not in force");
     }
     let long = LONG_REST * REST;
     assert_eq!(becomes(fallen(2, long - 2), &well()), fault(Fault::NoLock));
-    let (after, orders) = step(fallen(2, long - 1), &well());
-    assert_eq!((after.mode, after.starts, orders), (Mode::Listen, 2, Orders::Rest));
+    let (after, command) = step(fallen(2, long - 1), &well());
+    assert_eq!((after.mode, after.starts, command), (Mode::Listen, 2, LoopCommand::Rest));
     assert_eq!(becomes(fallen(0, REST + 7), &invalid()), fault(Fault::NoLock), "not without a measurement");
     let clipped = Observation { clipped: true, ..well() };
     assert_eq!(becomes(fallen(0, REST + 7), &clipped), fault(Fault::NoLock), "not at the end of a converter's range");
@@ -161,19 +161,20 @@ fn a_converter_that_is_stuck_is_not_started() {
 }
 
 #[test]
-fn the_wish_for_rest_turns_everything_off_and_keeps_the_name_of_the_fault() {
+fn a_request_for_rest_turns_everything_off_and_keeps_the_name_of_the_fault() {
     for mode in [Mode::Listen, Mode::Sweep, Mode::WholeAngle, Mode::Hold, Mode::Coast, Mode::Fault] {
         let before = SupervisorState {
-            wish: Wish::Off,
+            requested: RequestedMode::Off,
             fault: Some(Fault::NoLock),
             starts: 2,
             sweeps: 1,
             good: 4,
             ..in_mode(mode, 7)
         };
-        let (after, orders) = step(before, &well());
-        let expected = SupervisorState { wish: Wish::Off, fault: Some(Fault::NoLock), ..SupervisorState::default() };
-        assert_eq!((after, orders), (expected, Orders::Rest));
+        let (after, command) = step(before, &well());
+        let expected =
+            SupervisorState { requested: RequestedMode::Off, fault: Some(Fault::NoLock), ..SupervisorState::default() };
+        assert_eq!((after, command), (expected, LoopCommand::Rest));
     }
 }
 

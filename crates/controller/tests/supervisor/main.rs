@@ -1,4 +1,4 @@
-//! The supervisor window by window: what each mode orders, what ends it, after exactly how many windows, and on which
+//! The supervisor window by window: what each mode command, what ends it, after exactly how many windows, and on which
 //! side of each bound the bound itself lies. Here are the instrument and the windows of which the tests speak.
 
 mod endings;
@@ -8,8 +8,8 @@ mod settings;
 mod start;
 mod table;
 
-use cvg_controller::supervisor::{Beat, Observation, Orders};
-use cvg_controller::{Fault, Mode, Supervisor, SupervisorSettings, SupervisorState, Wish};
+use cvg_controller::supervisor::{Beat, LoopCommand, Observation};
+use cvg_controller::{Fault, Mode, RequestedMode, Supervisor, SupervisorSettings, SupervisorState};
 use cvg_model::Pendulum;
 
 /// Set energy, V²: the amplitude of 5 V squared.
@@ -32,16 +32,16 @@ const LONG_REST: u32 = 64;
 const IN_A_ROW: u32 = 20;
 const WINDOW_S: f64 = 0.25;
 
-const RUN: Orders<f64> = Orders::Run { hold: false, ring_down: false };
-const RUN_HELD: Orders<f64> = Orders::Run { hold: true, ring_down: false };
-const RUN_DOWN: Orders<f64> = Orders::Run { hold: true, ring_down: true };
+const RUN: LoopCommand<f64> = LoopCommand::Run { hold: false, ring_down: false };
+const RUN_HELD: LoopCommand<f64> = LoopCommand::Run { hold: true, ring_down: false };
+const RUN_DOWN: LoopCommand<f64> = LoopCommand::Run { hold: true, ring_down: true };
 
 fn settings() -> SupervisorSettings {
     let windows = |n: u32| f64::from(n) * WINDOW_S;
     SupervisorSettings {
         window_s: WINDOW_S,
         amplitude_v: 5.0,
-        heard_v: 0.5,
+        detection_threshold_v: 0.5,
         band_rad_s: 100.0,
         sweep_s: windows(SWEEP),
         sweeps: 3,
@@ -49,10 +49,10 @@ fn settings() -> SupervisorSettings {
         lock_s: windows(LOCK),
         spin_up_s: windows(SPIN_UP),
         coast_s: windows(COAST),
-        endure_s: windows(ENDURE),
+        fault_debounce_s: windows(ENDURE),
         rest_s: windows(REST),
         retries: 2,
-        forget_s: windows(FORGET),
+        fault_memory_s: windows(FORGET),
     }
 }
 
@@ -62,12 +62,12 @@ fn supervisor() -> Supervisor<f64> {
 
 /// The state in `mode` after so many windows of it.
 fn in_mode(mode: Mode, windows: u32) -> SupervisorState {
-    let wish = match mode {
-        Mode::Hold => Wish::Hold,
-        Mode::RingDown => Wish::RingDown,
-        _ => Wish::WholeAngle,
+    let requested = match mode {
+        Mode::Hold => RequestedMode::Hold,
+        Mode::RingDown => RequestedMode::RingDown,
+        _ => RequestedMode::WholeAngle,
     };
-    SupervisorState { mode, wish, windows, ..SupervisorState::default() }
+    SupervisorState { mode, requested, windows, ..SupervisorState::default() }
 }
 
 /// A line at the set amplitude, off the axes and in phase.
@@ -91,24 +91,24 @@ fn invalid() -> Observation<f64> {
     Observation { valid: false, ..well() }
 }
 
-/// The state and the orders after one window.
-fn step(mut state: SupervisorState, o: &Observation<f64>) -> (SupervisorState, Orders<f64>) {
-    let orders = supervisor().step(&mut state, o, None);
-    (state, orders)
+/// The state and the command after one window.
+fn step(mut state: SupervisorState, o: &Observation<f64>) -> (SupervisorState, LoopCommand<f64>) {
+    let command = supervisor().step(&mut state, o, None);
+    (state, command)
 }
 
 /// The same while listening, with what was heard.
-fn hear(mut state: SupervisorState, x2: f64, y2: f64) -> (SupervisorState, Orders<f64>) {
-    let orders = supervisor().step(&mut state, &well(), Some(Beat { x2, y2, windows: 8 }));
-    (state, orders)
+fn hear(mut state: SupervisorState, x2: f64, y2: f64) -> (SupervisorState, LoopCommand<f64>) {
+    let command = supervisor().step(&mut state, &well(), Some(Beat { x2, y2, windows: 8 }));
+    (state, command)
 }
 
 /// What one window in a mode leads to.
-fn becomes(before: SupervisorState, o: &Observation<f64>) -> (Mode, Option<Fault>, Orders<f64>) {
-    let (after, orders) = step(before, o);
-    (after.mode, after.fault_now(), orders)
+fn becomes(before: SupervisorState, o: &Observation<f64>) -> (Mode, Option<Fault>, LoopCommand<f64>) {
+    let (after, command) = step(before, o);
+    (after.mode, after.fault_now(), command)
 }
 
-const fn fault(fault: Fault) -> (Mode, Option<Fault>, Orders<f64>) {
-    (Mode::Fault, Some(fault), Orders::Rest)
+const fn fault(fault: Fault) -> (Mode, Option<Fault>, LoopCommand<f64>) {
+    (Mode::Fault, Some(fault), LoopCommand::Rest)
 }

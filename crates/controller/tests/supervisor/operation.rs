@@ -4,24 +4,24 @@ use super::*;
 
 #[test]
 fn each_mode_of_operation_has_its_orders() {
-    for (mode, orders) in [(Mode::WholeAngle, RUN), (Mode::Hold, RUN_HELD), (Mode::RingDown, RUN_DOWN)] {
-        assert_eq!(becomes(in_mode(mode, 3), &well()), (mode, None, orders));
+    for (mode, command) in [(Mode::WholeAngle, RUN), (Mode::Hold, RUN_HELD), (Mode::RingDown, RUN_DOWN)] {
+        assert_eq!(becomes(in_mode(mode, 3), &well()), (mode, None, command));
     }
 }
 
 #[test]
-fn a_wish_is_fulfilled_at_once_where_the_amplitude_allows() {
+fn a_request_is_fulfilled_at_once_where_the_amplitude_allows() {
     let modes = [
-        (Wish::WholeAngle, Mode::WholeAngle, RUN),
-        (Wish::Hold, Mode::Hold, RUN_HELD),
-        (Wish::RingDown, Mode::RingDown, RUN_DOWN),
+        (RequestedMode::WholeAngle, Mode::WholeAngle, RUN),
+        (RequestedMode::Hold, Mode::Hold, RUN_HELD),
+        (RequestedMode::RingDown, Mode::RingDown, RUN_DOWN),
     ];
     for (_, from, _) in modes {
-        for (wish, to, orders) in modes {
-            let before = SupervisorState { wish, ..in_mode(from, 4) };
-            assert_eq!(becomes(before, &well()), (to, None, orders), "{from:?} to {to:?}");
+        for (requested, to, command) in modes {
+            let before = SupervisorState { requested, ..in_mode(from, 4) };
+            assert_eq!(becomes(before, &well()), (to, None, command), "{from:?} to {to:?}");
             // a quarter of the set energy is enough
-            assert_eq!(becomes(before, &energy(6.25)), (to, None, orders), "{from:?} to {to:?}");
+            assert_eq!(becomes(before, &energy(6.25)), (to, None, command), "{from:?} to {to:?}");
             if from != to {
                 assert_eq!(becomes(before, &energy(6.24)), (Mode::SpinUp, None, RUN), "{from:?} to {to:?}");
             }
@@ -132,16 +132,16 @@ fn a_phase_error_of_half_the_energy_locks_anew() {
     for mode in [Mode::SpinUp, Mode::WholeAngle, Mode::Hold, Mode::RingDown] {
         for l in [12.5, -12.5] {
             let locked = becomes(in_mode(mode, 3), &with(|p| p.l = l));
-            assert_eq!(locked, (Mode::Lock, None, Orders::Snap), "{mode:?}");
+            assert_eq!(locked, (Mode::Lock, None, LoopCommand::Snap), "{mode:?}");
         }
         assert_eq!(becomes(in_mode(mode, 3), &with(|p| p.l = 12.49)).0, mode);
     }
 }
 
 #[test]
-fn an_instrument_goes_on_as_wished_where_nothing_is_counted_and_nothing_to_forget() {
+fn an_instrument_goes_on_as_requested_where_nothing_is_counted_and_nothing_to_forget() {
     let on = |state: SupervisorState, o: Observation<f64>| {
-        let on = supervisor().goes_on(&state, &o.pendulum);
+        let on = supervisor().runs_unchanged(&state, &o.pendulum);
         if on {
             // all that a step does is to count the window
             let mut counted = state;
@@ -153,8 +153,8 @@ fn an_instrument_goes_on_as_wished_where_nothing_is_counted_and_nothing_to_forge
     for mode in [Mode::WholeAngle, Mode::Hold] {
         let state = in_mode(mode, FORGET + 5);
         assert!(on(state, well()));
-        for wish in [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off] {
-            assert_eq!(on(SupervisorState { wish, ..state }, well()), wish == state.wish);
+        for requested in [RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off] {
+            assert_eq!(on(SupervisorState { requested, ..state }, well()), requested == state.requested);
         }
         for (bad, repeats, clipped) in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 1, 1)] {
             assert!(!on(SupervisorState { bad, repeats, clipped, ..state }, well()));

@@ -8,7 +8,7 @@ fn settings_that_are_no_positive_numbers_are_refused_by_name() {
     let fields: [(&str, Change); 4] = [
         ("window_s", |s, v| s.window_s = v),
         ("amplitude_v", |s, v| s.amplitude_v = v),
-        ("heard_v", |s, v| s.heard_v = v),
+        ("detection_threshold_v", |s, v| s.detection_threshold_v = v),
         ("band_rad_s", |s, v| s.band_rad_s = v),
     ];
     for (name, change) in fields {
@@ -22,12 +22,13 @@ fn settings_that_are_no_positive_numbers_are_refused_by_name() {
 
 #[test]
 fn what_is_heard_has_to_lie_below_a_third_of_the_set_amplitude() {
-    let new = |heard_v| {
-        Supervisor::<f64>::new(&SupervisorSettings { amplitude_v: 3.0, heard_v, ..settings() }).map_err(|e| e.parameter)
+    let new = |detection_threshold_v| {
+        Supervisor::<f64>::new(&SupervisorSettings { amplitude_v: 3.0, detection_threshold_v, ..settings() })
+            .map_err(|e| e.parameter)
     };
     assert!(new(0.999).is_ok());
-    assert_eq!(new(1.0), Err("heard_v"));
-    assert_eq!(new(1.001), Err("heard_v"));
+    assert_eq!(new(1.0), Err("detection_threshold_v"));
+    assert_eq!(new(1.001), Err("detection_threshold_v"));
 }
 
 #[test]
@@ -39,9 +40,9 @@ fn a_time_is_a_window_at_least_and_fewer_than_two_to_the_31() {
         ("lock_s", |s, v| s.lock_s = v),
         ("spin_up_s", |s, v| s.spin_up_s = v),
         ("coast_s", |s, v| s.coast_s = v),
-        ("endure_s", |s, v| s.endure_s = v),
+        ("fault_debounce_s", |s, v| s.fault_debounce_s = v),
         ("rest_s", |s, v| s.rest_s = v),
-        ("forget_s", |s, v| s.forget_s = v),
+        ("fault_memory_s", |s, v| s.fault_memory_s = v),
     ];
     let most = f64::from(1_u32 << 31) * WINDOW_S;
     for (name, change) in fields {

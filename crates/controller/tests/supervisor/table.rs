@@ -83,7 +83,13 @@ fn any_state(dice: &mut Dice) -> SupervisorState {
     SupervisorState {
         mode: dice.of(&Mode::ALL),
         fault: dice.of(&FAULTS),
-        wish: dice.of(&[Wish::WholeAngle, Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]),
+        requested: dice.of(&[
+            RequestedMode::WholeAngle,
+            RequestedMode::WholeAngle,
+            RequestedMode::Hold,
+            RequestedMode::RingDown,
+            RequestedMode::Off,
+        ]),
         windows: any_count(dice),
         good: any_count(dice),
         bad: few(dice),
@@ -141,17 +147,17 @@ fn any_beat<T: Scalar>(dice: &mut Dice) -> Option<Beat<T>> {
     if dice.rarely() { None } else { Some(Beat { x2, y2, windows: 8 }) }
 }
 
-/// What is wished is a mode of operation.
-fn wished(wish: Wish) -> Mode {
-    match wish {
-        Wish::Hold => Mode::Hold,
-        Wish::RingDown => Mode::RingDown,
+/// What is requested is a mode of operation.
+fn requested(requested: RequestedMode) -> Mode {
+    match requested {
+        RequestedMode::Hold => Mode::Hold,
+        RequestedMode::RingDown => Mode::RingDown,
         _ => Mode::WholeAngle,
     }
 }
 
-fn run<T>(mode: Mode) -> Orders<T> {
-    Orders::Run { hold: mode == Mode::Hold || mode == Mode::RingDown, ring_down: mode == Mode::RingDown }
+fn run<T>(mode: Mode) -> LoopCommand<T> {
+    LoopCommand::Run { hold: mode == Mode::Hold || mode == Mode::RingDown, ring_down: mode == Mode::RingDown }
 }
 
 fn half<T: Float>(v: T) -> T {
@@ -168,15 +174,15 @@ struct Table {
 }
 
 impl Table {
-    fn fault<T: Scalar>(&mut self, fault: Fault) -> Orders<T> {
+    fn fault<T: Scalar>(&mut self, fault: Fault) -> LoopCommand<T> {
         (self.s.mode, self.s.fault, self.s.windows, self.s.good) = (Mode::Fault, Some(fault), 0, 0);
         (self.s.bad, self.s.coasts, self.s.trying) = (0, 0, 0);
-        Orders::Rest
+        LoopCommand::Rest
     }
 
-    fn to<T: Scalar>(&mut self, mode: Mode, orders: Orders<T>) -> Orders<T> {
+    fn to<T: Scalar>(&mut self, mode: Mode, command: LoopCommand<T>) -> LoopCommand<T> {
         (self.s.mode, self.s.windows, self.s.good) = (mode, 0, 0);
-        orders
+        command
     }
 
     /// The 51st interruption is a fault.
@@ -185,13 +191,14 @@ impl Table {
         self.s.coasts > 50
     }
 
-    fn step<T: Scalar>(&mut self, o: &Observation<T>, beat: Option<Beat<T>>) -> Orders<T> {
+    fn step<T: Scalar>(&mut self, o: &Observation<T>, beat: Option<Beat<T>>) -> LoopCommand<T> {
         self.s.windows = self.s.windows.saturating_add(1);
         let p = &o.pendulum;
-        let aligned = matches!(self.s.mode, Mode::WholeAngle | Mode::Hold) && wished(self.s.wish) == self.s.mode;
+        let aligned =
+            matches!(self.s.mode, Mode::WholeAngle | Mode::Hold) && requested(self.s.requested) == self.s.mode;
         let bounded = p.e > t(6.25) && p.e < t(56.25) && p.q.magnitude() < half(p.e) && p.l.magnitude() < half(p.e);
         let unblemished = o.valid && !o.clipped && !o.repeats && !o.jumped;
-        if aligned && self.s.wish != Wish::Off && bounded && unblemished {
+        if aligned && self.s.requested != RequestedMode::Off && bounded && unblemished {
             self.s.repeats = 0;
             if self.s.windows >= ENDURE {
                 (self.s.bad, self.s.clipped) = (0, 0);
@@ -201,9 +208,10 @@ impl Table {
             }
             return run(self.s.mode);
         }
-        if self.s.wish == Wish::Off {
-            self.s = SupervisorState { wish: Wish::Off, fault: self.s.fault, ..SupervisorState::default() };
-            return Orders::Rest;
+        if self.s.requested == RequestedMode::Off {
+            self.s =
+                SupervisorState { requested: RequestedMode::Off, fault: self.s.fault, ..SupervisorState::default() };
+            return LoopCommand::Rest;
         }
         self.s.repeats = if o.repeats { self.s.repeats.saturating_add(1) } else { 0 };
         if self.s.mode == Mode::Fault {
@@ -221,7 +229,7 @@ impl Table {
     }
 
     /// What ends any mode but a fault.
-    fn ended<T: Scalar>(&mut self, o: &Observation<T>) -> Option<Orders<T>> {
+    fn ended<T: Scalar>(&mut self, o: &Observation<T>) -> Option<LoopCommand<T>> {
         let named = |fault| if o.clipped { Fault::Saturated } else { fault };
         if self.s.repeats >= 20 {
             return Some(self.fault(named(Fault::StuckChannel)));
@@ -247,65 +255,65 @@ impl Table {
             return Some(if self.interrupted() {
                 self.fault(Fault::InvalidSamples)
             } else {
-                self.to(Mode::Coast, Orders::Rest)
+                self.to(Mode::Coast, LoopCommand::Rest)
             });
         }
         None
     }
 
-    fn rest<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
+    fn rest<T: Scalar>(&mut self, o: &Observation<T>) -> LoopCommand<T> {
         let tried_often = self.s.starts >= 2;
         let rest = if tried_often { REST * LONG_REST } else { REST };
         if !o.valid || o.clipped || self.s.repeats >= 20 || self.s.windows < rest {
-            return Orders::Rest;
+            return LoopCommand::Rest;
         }
         if !tried_often {
             self.s.starts += 1;
         }
         (self.s.sweeps, self.s.clipped, self.s.trying, self.s.cause) = (0, 0, 0, None);
-        self.to(Mode::Listen, Orders::Rest)
+        self.to(Mode::Listen, LoopCommand::Rest)
     }
 
-    fn listen<T: Scalar>(&mut self, beat: Option<Beat<T>>) -> Orders<T> {
-        let Some(beat) = beat.filter(|_| self.s.windows >= LISTEN) else { return Orders::Listen };
+    fn listen<T: Scalar>(&mut self, beat: Option<Beat<T>>) -> LoopCommand<T> {
+        let Some(beat) = beat.filter(|_| self.s.windows >= LISTEN) else { return LoopCommand::Listen };
         let both = beat.x2 + beat.y2;
         let heard = both > t(f64::from(beat.windows) * 0.25);
         let driven = self.s.sweeps > 0 || self.s.fault == Some(Fault::DeadChannel);
         let dead = driven && (if beat.x2 < beat.y2 { beat.x2 } else { beat.y2 }) < both * T::ratio(1, 400);
         match (heard, dead) {
-            (true, false) => self.to(Mode::Lock, Orders::Tune),
-            _ if self.s.sweeps < 3 => self.to(Mode::Sweep, Orders::Rest),
+            (true, false) => self.to(Mode::Lock, LoopCommand::Tune),
+            _ if self.s.sweeps < 3 => self.to(Mode::Sweep, LoopCommand::Rest),
             (true, true) => self.fault(Fault::DeadChannel),
             (false, _) => self.fault(Fault::NoResonance),
         }
     }
 
-    fn sweep<T: Scalar>(&mut self) -> Orders<T> {
+    fn sweep<T: Scalar>(&mut self) -> LoopCommand<T> {
         let length = SWEEP << self.s.sweeps.min(8);
         if self.s.windows >= length {
             self.s.sweeps = self.s.sweeps.saturating_add(1);
-            return self.to(Mode::Listen, Orders::Rest);
+            return self.to(Mode::Listen, LoopCommand::Rest);
         }
         let share = t::<T>(f64::from(self.s.windows)) / t(f64::from(length));
-        Orders::Sweep {
+        LoopCommand::Sweep {
             correction_rad_s: t::<T>(100.0) * (t::<T>(2.0) * share - t(1.0)),
             opposed: self.s.sweeps % 2 == 1,
         }
     }
 
-    fn lock<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
+    fn lock<T: Scalar>(&mut self, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
         if t::<T>(4.0) * p.e < t(0.25) {
-            return self.to(Mode::Listen, Orders::Rest);
+            return self.to(Mode::Listen, LoopCommand::Rest);
         }
         if self.s.windows == 1 {
-            return Orders::Snap;
+            return LoopCommand::Snap;
         }
         self.s.good = if p.l.magnitude() < t::<T>(0.2) * p.e { self.s.good.saturating_add(1) } else { 0 };
         if self.s.good >= 20 {
             return self.to(Mode::SpinUp, run(Mode::WholeAngle));
         }
-        if self.s.windows >= LOCK { self.fault(Fault::NoLock) } else { Orders::Lock }
+        if self.s.windows >= LOCK { self.fault(Fault::NoLock) } else { LoopCommand::Lock }
     }
 
     /// The names of a vibration that is gone or jumped.
@@ -317,7 +325,7 @@ impl Table {
         }
     }
 
-    fn spin_up<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
+    fn spin_up<T: Scalar>(&mut self, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
         if t::<T>(4.0) * p.e < t(0.25) {
             return self.fault(Self::instead(o, Fault::AmplitudeLow));
@@ -329,52 +337,52 @@ impl Table {
             if self.s.cause == Some(Fault::DeadChannel) && p.s.magnitude() < p.r.magnitude() * T::ratio(1, 30) {
                 return self.fault(Fault::DeadChannel);
             }
-            let mode = wished(self.s.wish);
+            let mode = requested(self.s.requested);
             return self.to(mode, run(mode));
         }
-        if let Some(orders) = self.bounds(p, false) {
-            return orders;
+        if let Some(command) = self.bounds(p, false) {
+            return command;
         }
         if self.s.windows >= SPIN_UP {
             return self.fault(Fault::NoSpinUp);
         }
-        run(if self.s.wish == Wish::WholeAngle { Mode::WholeAngle } else { Mode::Hold })
+        run(if self.s.requested == RequestedMode::WholeAngle { Mode::WholeAngle } else { Mode::Hold })
     }
 
-    fn coast<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
+    fn coast<T: Scalar>(&mut self, o: &Observation<T>) -> LoopCommand<T> {
         if !o.valid {
             self.s.good = 0;
             if self.s.windows >= COAST {
                 return self.fault(self.s.cause.unwrap_or(Fault::InvalidSamples));
             }
-            return Orders::Rest;
+            return LoopCommand::Rest;
         }
         self.s.good = self.s.good.saturating_add(1);
         match (self.s.good >= 2, t::<T>(4.0) * o.pendulum.e < t(0.25)) {
-            (false, _) => Orders::Rest,
-            (true, true) => self.to(Mode::Listen, Orders::Rest),
-            (true, false) => self.to(Mode::Lock, Orders::Snap),
+            (false, _) => LoopCommand::Rest,
+            (true, true) => self.to(Mode::Listen, LoopCommand::Rest),
+            (true, false) => self.to(Mode::Lock, LoopCommand::Snap),
         }
     }
 
-    fn operate<T: Scalar>(&mut self, o: &Observation<T>) -> Orders<T> {
+    fn operate<T: Scalar>(&mut self, o: &Observation<T>) -> LoopCommand<T> {
         let p = &o.pendulum;
         if o.jumped {
             let cause = Self::instead(o, Fault::DeadChannel);
             self.s.cause = Some(cause);
-            return if self.interrupted() { self.fault(cause) } else { self.to(Mode::Coast, Orders::Rest) };
+            return if self.interrupted() { self.fault(cause) } else { self.to(Mode::Coast, LoopCommand::Rest) };
         }
         if t::<T>(4.0) * p.e < t(0.25) {
             return self.fault(Self::instead(o, Fault::AmplitudeLow));
         }
         let (mode, low) = (self.s.mode, p.e < t(6.25));
-        if wished(self.s.wish) != mode {
+        if requested(self.s.requested) != mode {
             self.s.trying = 0;
-            let next = if low { Mode::SpinUp } else { wished(self.s.wish) };
+            let next = if low { Mode::SpinUp } else { requested(self.s.requested) };
             return self.to(next, run(next));
         }
-        if let Some(orders) = self.bounds(p, low && mode != Mode::RingDown) {
-            return orders;
+        if let Some(command) = self.bounds(p, low && mode != Mode::RingDown) {
+            return command;
         }
         if mode != Mode::RingDown {
             self.s.windows = 0;
@@ -382,13 +390,13 @@ impl Table {
         run(mode)
     }
 
-    fn bounds<T: Scalar>(&mut self, p: &Pendulum<T>, low: bool) -> Option<Orders<T>> {
+    fn bounds<T: Scalar>(&mut self, p: &Pendulum<T>, low: bool) -> Option<LoopCommand<T>> {
         let in_phase = p.l.magnitude() < half(p.e);
         if !in_phase {
             return Some(if self.interrupted() {
                 self.fault(Fault::NoLock)
             } else {
-                self.to(Mode::Lock, Orders::Snap)
+                self.to(Mode::Lock, LoopCommand::Snap)
             });
         }
         let names = [
@@ -409,9 +417,9 @@ fn a_step_is_that_of_the_table<T: Scalar>() {
     for _ in 0..400_000 {
         let (before, o, beat) = (any_state(&mut dice), any_window::<T>(&mut dice), any_beat(&mut dice));
         let (mut state, mut table) = (before, Table { s: before });
-        let orders = supervisor.step(&mut state, &o, beat);
+        let command = supervisor.step(&mut state, &o, beat);
         let expected = table.step(&o, beat);
-        assert_eq!((state, orders), (table.s, expected), "{before:?}\n{o:?}\n{beat:?}");
+        assert_eq!((state, command), (table.s, expected), "{before:?}\n{o:?}\n{beat:?}");
         passed.insert(format!("{:?} {:?} {:?}", before.mode, state.mode, state.fault_now()));
     }
     // from every mode to every mode that follows it, and every fault
@@ -430,15 +438,15 @@ fn what_goes_on_is_counted<T: Scalar>() {
     let mut on = 0;
     for _ in 0..400_000 {
         let (before, o) = (any_state(&mut dice), any_window::<T>(&mut dice));
-        if !supervisor.goes_on(&before, &o.pendulum) {
+        if !supervisor.runs_unchanged(&before, &o.pendulum) {
             continue;
         }
         on += 1;
         let well = Observation { valid: true, clipped: false, repeats: false, jumped: false, ..o };
         let (mut state, mut counted) = (before, before);
-        let orders = supervisor.step(&mut state, &well, None);
+        let command = supervisor.step(&mut state, &well, None);
         counted.count();
-        assert_eq!((state, orders), (counted, run(before.mode)), "{before:?}\n{o:?}");
+        assert_eq!((state, command), (counted, run(before.mode)), "{before:?}\n{o:?}");
         assert!(Supervisor::in_phase(&o.pendulum), "{before:?}\n{o:?}");
     }
     assert!(on > 500, "{on}");
@@ -460,13 +468,19 @@ fn a_walk_of_any_windows_is_that_of_the_table() {
         for k in 0..1000 {
             let o = if dice.roll().is_multiple_of(calm + 1) { any_window(&mut dice) } else { well() };
             if dice.roll().is_multiple_of(100) {
-                let wish = dice.of(&[Wish::WholeAngle, Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]);
-                (state.wish, table.s.wish) = (wish, wish);
+                let requested = dice.of(&[
+                    RequestedMode::WholeAngle,
+                    RequestedMode::WholeAngle,
+                    RequestedMode::Hold,
+                    RequestedMode::RingDown,
+                    RequestedMode::Off,
+                ]);
+                (state.requested, table.s.requested) = (requested, requested);
             }
             let beat = (state.mode == Mode::Listen).then(|| any_beat(&mut dice)).flatten();
-            let orders = supervisor().step(&mut state, &o, beat);
+            let command = supervisor().step(&mut state, &o, beat);
             assert_eq!(
-                (state, orders),
+                (state, command),
                 {
                     let expected = table.step(&o, beat);
                     (table.s, expected)

@@ -1,37 +1,37 @@
 //! The oscillator's correction where no loop runs.
 
-use cvg_controller::supervisor::Orders;
+use cvg_controller::supervisor::LoopCommand;
 use cvg_estimator::{Beat, LockState};
 use cvg_model::{Envelope, Float};
 use kani::Arbitrary;
 
 use crate::correction::ordered;
 
-fn any_orders<T: Float + Arbitrary>() -> Orders<T> {
+fn any_loop_command<T: Float + Arbitrary>() -> LoopCommand<T> {
     match kani::any::<u8>() % 7 {
-        0 => Orders::Rest,
-        1 => Orders::Listen,
-        2 => Orders::Sweep { correction_rad_s: kani::any(), opposed: kani::any() },
-        3 => Orders::Tune,
-        4 => Orders::Snap,
-        5 => Orders::Lock,
-        _ => Orders::Run { hold: kani::any(), ring_down: kani::any() },
+        0 => LoopCommand::Rest,
+        1 => LoopCommand::Listen,
+        2 => LoopCommand::Sweep { correction_rad_s: kani::any(), opposed: kani::any() },
+        3 => LoopCommand::Tune,
+        4 => LoopCommand::Snap,
+        5 => LoopCommand::Lock,
+        _ => LoopCommand::Run { hold: kani::any(), ring_down: kani::any() },
     }
 }
 
 fn what_is_ordered_is_within_the_limit<T: Float + Arbitrary>(share: T) {
     // precondition: a limit that the settings accept
     let limit: T = kani::any_where(|l: &T| *l > T::zero() && l.is_finite());
-    let orders = any_orders::<T>();
+    let command = any_loop_command::<T>();
     let lock = LockState { detuning_rad_s: kani::any::<T>() };
     let mut beat = Beat::default();
     for _ in 0..2 {
         beat.add(&Envelope::new(kani::any(), kani::any(), kani::any(), kani::any()));
     }
-    let correction = ordered(&orders, &lock, &beat, kani::any(), limit);
-    kani::cover!(orders == Orders::Tune && correction == limit, "a beat beyond the limit");
-    kani::cover!(matches!(orders, Orders::Sweep { .. }) && correction == -limit, "a sweep beyond the limit");
-    kani::cover!(orders == Orders::Listen && correction == limit, "a detuning that cannot be");
+    let correction = ordered(&command, &lock, &beat, kani::any(), limit);
+    kani::cover!(command == LoopCommand::Tune && correction == limit, "a beat beyond the limit");
+    kani::cover!(matches!(command, LoopCommand::Sweep { .. }) && correction == -limit, "a sweep beyond the limit");
+    kani::cover!(command == LoopCommand::Listen && correction == limit, "a detuning that cannot be");
     assert!(correction.magnitude() <= share * limit);
 }
 

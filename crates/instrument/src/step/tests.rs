@@ -2,7 +2,7 @@
 
 extern crate std;
 
-use cvg_controller::Wish;
+use cvg_controller::RequestedMode;
 use cvg_estimator::Phasor;
 use cvg_model::Orbit;
 use cvg_model::effects::{EffectId, Values};
@@ -28,7 +28,7 @@ const ACTUATIONS: [&[(EffectId, Values<f64>)]; 3] = [
 #[derive(Clone, Copy, Debug)]
 struct Case {
     settings: (usize, usize),
-    mode: (Mode, Wish),
+    mode: (Mode, RequestedMode),
     orbit: Orbit<f64>,
     /// the phase at which the window begins, rad
     phase: f64,
@@ -56,7 +56,7 @@ fn prepared<T: Float>(i: &Instrument<T>, case: &Case) -> (State<T>, [T; 4]) {
     let mut state = i.start();
     // the count of control steps comes round
     state.windows = u32::MAX;
-    (state.supervisor.mode, state.supervisor.wish) = case.mode;
+    (state.supervisor.mode, state.supervisor.requested) = case.mode;
     let [windows, bad, repeats, clipped, starts] = case.counts;
     (state.supervisor.windows, state.supervisor.bad) = (windows, bad);
     (state.supervisor.repeats, state.supervisor.clipped) = (repeats, clipped);
@@ -95,7 +95,7 @@ fn compare<T: Float>(case: &Case) -> Result<bool, TestCaseError> {
     let i = instrument::<T>(case);
     let (state, [x, y, cos, sin]) = prepared(&i, case);
     let (mut short, mut long) = (state, state);
-    let said = (i.last(&mut short, x, y, cos, sin), i.last_otherwise(&mut long, x, y, cos, sin));
+    let said = (i.last(&mut short, x, y, cos, sin), i.end_window_suspect(&mut long, x, y, cos, sin));
     prop_assert_eq!(said.0, said.1);
     prop_assert_eq!(short, long);
     prop_assert_eq!(short.windows, 0);
@@ -107,7 +107,7 @@ fn compare<T: Float>(case: &Case) -> Result<bool, TestCaseError> {
     let (e, p) = (short.seen.compensated, short.seen.compensated.pendulum());
     let undisturbed = short.status.valid && !short.status.clipped && !case.repeats;
     Ok(undisturbed
-        && i.supervisor.goes_on(&state.supervisor, &p)
+        && i.supervisor.runs_unchanged(&state.supervisor, &p)
         && match case.mode.0 {
             mode if mode == i.shortest => i.steadily::<false>(&mut again, &e, &p, cos, sin).is_some(),
             _ => i.steadily::<true>(&mut again, &e, &p, cos, sin).is_some(),
@@ -124,7 +124,7 @@ fn both_precisions(case: &Case) -> Result<(), TestCaseError> {
 fn calm(theta: f64) -> Case {
     Case {
         settings: (0, 0),
-        mode: (Mode::WholeAngle, Wish::WholeAngle),
+        mode: (Mode::WholeAngle, RequestedMode::WholeAngle),
         orbit: Orbit { a: 1.0, q: 1e-3, theta, delta: 1e-3 },
         phase: 0.4,
         turned: (2e-3, 3e-3),
@@ -139,9 +139,9 @@ prop_compose! {
     fn case()(
         settings in (0..READOUTS.len(), 0..ACTUATIONS.len()),
         mode in prop::sample::select(std::vec![
-            (Mode::WholeAngle, Wish::WholeAngle), (Mode::WholeAngle, Wish::WholeAngle), (Mode::Hold, Wish::Hold),
-            (Mode::WholeAngle, Wish::Hold), (Mode::SpinUp, Wish::WholeAngle), (Mode::Lock, Wish::WholeAngle),
-            (Mode::Listen, Wish::WholeAngle), (Mode::RingDown, Wish::RingDown), (Mode::Fault, Wish::Off),
+            (Mode::WholeAngle, RequestedMode::WholeAngle), (Mode::WholeAngle, RequestedMode::WholeAngle), (Mode::Hold, RequestedMode::Hold),
+            (Mode::WholeAngle, RequestedMode::Hold), (Mode::SpinUp, RequestedMode::WholeAngle), (Mode::Lock, RequestedMode::WholeAngle),
+            (Mode::Listen, RequestedMode::WholeAngle), (Mode::RingDown, RequestedMode::RingDown), (Mode::Fault, RequestedMode::Off),
         ]),
         theta in -3.1_f64..3.1,
         // now and then far from a line of the set amplitude, now and then far from the last window
@@ -185,7 +185,7 @@ fn the_short_way_is_that_of_nearly_every_window() -> Result<(), TestCaseError> {
             short += usize::from(compare::<f32>(&case)?) + usize::from(compare::<f64>(&case)?);
         }
         // at the angle at which it is held
-        let held = Case { mode: (Mode::Hold, Wish::Hold), ..calm(0.01 * theta) };
+        let held = Case { mode: (Mode::Hold, RequestedMode::Hold), ..calm(0.01 * theta) };
         short += usize::from(compare::<f32>(&held)?) + usize::from(compare::<f64>(&held)?);
     }
     // but where the pattern crosses the R axis
@@ -211,8 +211,8 @@ fn what_is_amiss_takes_the_long_way() -> Result<(), TestCaseError> {
         Case { integrals: [0.0, 0.0, 0.0, 1e5], ..well },
         Case { counts: [1000, 1, 0, 0, 0], ..well },
         Case { counts: [30_000, 0, 0, 0, 1], ..well },
-        Case { mode: (Mode::WholeAngle, Wish::Hold), ..well },
-        Case { mode: (Mode::SpinUp, Wish::WholeAngle), ..well },
+        Case { mode: (Mode::WholeAngle, RequestedMode::Hold), ..well },
+        Case { mode: (Mode::SpinUp, RequestedMode::WholeAngle), ..well },
     ];
     for case in amiss {
         assert!(!compare::<f32>(&case)? && !compare::<f64>(&case)?, "{case:?}");

@@ -4,7 +4,7 @@
 mod parts;
 mod script;
 
-use cvg_instrument::{Instrument, Mode, Settings, State, Tuning, Wish};
+use cvg_instrument::{Instrument, Mode, RequestedMode, Settings, State, Tuning};
 use cvg_model::Float;
 use cvg_model::effects::{EffectId, Values};
 use proptest::prelude::*;
@@ -56,7 +56,7 @@ fn settings(which: usize) -> Settings<'static> {
         rate: tuning(2.5, 1.1),
         hold_rad: 0.35,
         fastest_rad_s: 41.0,
-        heard_v: 0.03,
+        detection_threshold_v: 0.03,
         sweep_s: 0.05,
         readout: &[],
         actuation: &[],
@@ -93,7 +93,7 @@ fn compare<T: Float>(which: usize, script: &[Event]) -> Vec<Mode> {
     for event in script {
         for s in [&mut state, &mut joined] {
             match event {
-                Event::Wish(wish) => s.wish(*wish),
+                Event::RequestedMode(requested) => s.request(*requested),
                 Event::Acknowledge => s.acknowledge_half_turns(),
                 Event::Stalled => s.precession.sin_2_per_window = least(),
                 _ => {}
@@ -192,12 +192,12 @@ fn a_pattern_that_turns_in_both_senses() {
 }
 
 #[test]
-fn every_wish_from_every_other() {
-    let wishes = [Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off];
-    for from in wishes {
+fn every_request_from_every_other() {
+    let requests = [RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off];
+    for from in requests {
         let mut script = running(5);
-        for to in wishes {
-            script.extend([Event::Wish(from), Event::Well(130), Event::Wish(to), Event::Well(130)]);
+        for to in requests {
+            script.extend([Event::RequestedMode(from), Event::Well(130), Event::RequestedMode(to), Event::Well(130)]);
         }
         in_both_precisions(&script, &[Mode::WholeAngle, Mode::Hold, Mode::RingDown]);
     }
@@ -208,7 +208,10 @@ fn whatever_is_wrong_with_a_converter() {
     for hold in [false, true] {
         for what in script::wrongs() {
             let mut script = running(20);
-            script.extend([Event::Wish(if hold { Wish::Hold } else { Wish::WholeAngle }), Event::Well(30)]);
+            script.extend([
+                Event::RequestedMode(if hold { RequestedMode::Hold } else { RequestedMode::WholeAngle }),
+                Event::Well(30),
+            ]);
             script.extend([what, Event::Well(60), Event::Acknowledge, Event::Well(40)]);
             all_settings::<f32>(&script);
             all_settings::<f64>(&script);

@@ -2,7 +2,7 @@
 
 use core::f64::consts::{FRAC_PI_4, PI, SQRT_2, TAU};
 
-use cvg_controller::supervisor::{Beat as Heard, Observation, Orders};
+use cvg_controller::supervisor::{Beat as Heard, LoopCommand, Observation};
 use cvg_controller::{
     ActuationCompensation, Allocation, Heading, Mode, OrbitCommands, Pi, PiState, RateLoop, Supervisor,
     SupervisorSettings,
@@ -63,7 +63,7 @@ impl<T: Float> Parts<T> {
         let supervisor = SupervisorSettings {
             window_s,
             amplitude_v: s.amplitude_v,
-            heard_v: s.heard_v,
+            detection_threshold_v: s.detection_threshold_v,
             band_rad_s: band,
             sweep_s: s.sweep_s,
             sweeps: 3,
@@ -71,10 +71,10 @@ impl<T: Float> Parts<T> {
             lock_s: 1.0,
             spin_up_s: 5.0,
             coast_s: 0.1,
-            endure_s: 0.3,
+            fault_debounce_s: 0.3,
             rest_s: 0.5,
             retries: 3,
-            forget_s: 10.0,
+            fault_memory_s: 10.0,
         };
         let rate = s.rate;
         Self {
@@ -87,7 +87,7 @@ impl<T: Float> Parts<T> {
                 s.fastest_rad_s,
                 0.1,
                 age_s + s.drive_delay_s + 0.5 * window_s,
-                0.2 * s.heard_v,
+                0.2 * s.detection_threshold_v,
             )
             .expect("a tracker"),
             readout: (!s.readout.is_empty()).then(|| Compensation::new(&told(s.readout)).expect("an inverse")),
@@ -179,8 +179,8 @@ impl<T: Float> Parts<T> {
         let (x2, y2) = s.beat.powers();
         let heard = Heard { x2, y2, windows: s.beat.windows() as i32 };
         let observation = Observation { pendulum: p, valid, clipped, repeats, jumped };
-        let orders = self.supervisor.step(&mut s.supervisor, &observation, (was == Mode::Listen).then_some(heard));
-        self.obey(s, orders, &e, &p);
+        let command = self.supervisor.step(&mut s.supervisor, &observation, (was == Mode::Listen).then_some(heard));
+        self.apply(s, command, &e, &p);
         s.windows = s.windows.wrapping_add(1);
         s.phasor = self.oscillator.tune(&s.phasor, s.seen.correction_rad_s);
         s.window = Window::begin(&s.phasor);
@@ -198,30 +198,30 @@ impl<T: Float> Parts<T> {
         s.status = Status { mode, fault, fresh: false, clipped, valid, half_turns_lost: c.lost };
     }
 
-    fn obey(&self, s: &mut State<T>, orders: Orders<T>, e: &Envelope<T>, p: &Pendulum<T>) {
+    fn apply(&self, s: &mut State<T>, command: LoopCommand<T>, e: &Envelope<T>, p: &Pendulum<T>) {
         let zero = T::zero();
         let [mut v_as, mut v_qc, mut v_qs] = [zero; 3];
         let mut forces = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
         let limit = self.oscillator.limit_rad_s();
         let mut rad_s = s.lock.detuning_rad_s.bounded(limit);
-        match orders {
-            Orders::Rest | Orders::Listen => {}
-            Orders::Sweep { correction_rad_s, opposed } => {
+        match command {
+            LoopCommand::Rest | LoopCommand::Listen => {}
+            LoopCommand::Sweep { correction_rad_s, opposed } => {
                 rad_s = correction_rad_s;
                 (forces.x_s, forces.y_s) = (self.drive_v, if opposed { -self.drive_v } else { self.drive_v });
             }
-            Orders::Tune => {
+            LoopCommand::Tune => {
                 let per_s = s.beat.radians_per_window() * T::from_f64(1.0 / self.window_s);
                 rad_s = (rad_s + per_s).bounded(limit);
                 forget(s);
                 s.lock.detuning_rad_s = rad_s;
             }
-            Orders::Snap => {
+            LoopCommand::Snap => {
                 let (cos, sin) = phase_ahead(e);
                 s.phasor = s.phasor.turned(cos, sin);
             }
-            Orders::Lock => rad_s = self.phase.step(&mut s.lock, p).rad_s,
-            Orders::Run { hold, ring_down } => {
+            LoopCommand::Lock => rad_s = self.phase.step(&mut s.lock, p).rad_s,
+            LoopCommand::Run { hold, ring_down } => {
                 if !ring_down {
                     v_as = self.energy.energy(&mut s.energy, p.e, self.set_v2).volts;
                 }
@@ -236,7 +236,7 @@ impl<T: Float> Parts<T> {
                 forces = self.allocation.step(&commands, then.cos, then.sin).volts;
             }
         }
-        if !matches!(orders, Orders::Run { .. }) {
+        if !matches!(command, LoopCommand::Run { .. }) {
             if s.supervisor.mode != Mode::Listen {
                 s.beat = Beat::default();
             }

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use cvg_instrument::{Settings, Wish};
+use cvg_instrument::{RequestedMode, Settings};
 use proptest::prelude::*;
 
 /// Something that happens, and for how many windows it lasts.
@@ -14,7 +14,7 @@ pub(super) enum Event {
     Constant(usize, f64, u32),
     /// one sample of it
     Once(usize, f64),
-    Wish(Wish),
+    RequestedMode(RequestedMode),
     Acknowledge,
     /// the precession that is known is all but none
     Stalled,
@@ -36,7 +36,7 @@ impl Event {
     pub(super) fn windows(&self) -> u32 {
         match *self {
             Self::Well(n) | Self::Silent(n) | Self::Constant(_, _, n) => n,
-            Self::Wish(_) | Self::Acknowledge | Self::Stalled => 0,
+            Self::RequestedMode(_) | Self::Acknowledge | Self::Stalled => 0,
             Self::Once(..) => 1,
             _ => 3,
         }
@@ -60,13 +60,18 @@ pub(super) fn wrongs() -> Vec<Event> {
 /// Anything.
 pub(super) fn event() -> impl Strategy<Value = Event> {
     let value = prop::sample::select(vec![f64::NAN, f64::INFINITY, 1e9, -1e9, 2.4, 0.0, 0.05, -0.4]);
-    let wish = prop::sample::select(vec![Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]);
+    let requested = prop::sample::select(vec![
+        RequestedMode::WholeAngle,
+        RequestedMode::Hold,
+        RequestedMode::RingDown,
+        RequestedMode::Off,
+    ]);
     prop_oneof![
         6 => (1_u32..120).prop_map(Event::Well),
         1 => (1_u32..60).prop_map(Event::Silent),
         2 => (0_usize..2, value.clone(), 1_u32..40).prop_map(|(c, v, n)| Event::Constant(c, v, n)),
         2 => (0_usize..2, value).prop_map(|(c, v)| Event::Once(c, v)),
-        2 => wish.prop_map(Event::Wish),
+        2 => requested.prop_map(Event::RequestedMode),
         1 => Just(Event::Acknowledge),
         1 => Just(Event::Stalled),
         2 => prop::sample::select(vec![0.001, 0.4, 0.5, 0.9, 1.0, 1.0, 1.1, 1.4, 1.6]).prop_map(Event::Amplitude),
@@ -122,7 +127,7 @@ impl Vibration {
             Event::Phase(by) => self.phase += by,
             Event::Round(q) => self.round = q,
             Event::Detuned(hz) => self.detuned_hz = hz,
-            Event::Well(_) | Event::Wish(_) | Event::Acknowledge | Event::Stalled => {}
+            Event::Well(_) | Event::RequestedMode(_) | Event::Acknowledge | Event::Stalled => {}
         }
     }
 

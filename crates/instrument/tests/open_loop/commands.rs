@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-use cvg_instrument::{Instrument, Mode, Settings, Wish};
+use cvg_instrument::{Instrument, Mode, RequestedMode, Settings};
 use cvg_model::effects::{EffectId, Values};
 use cvg_model::{Envelope, Float};
 
@@ -120,7 +120,7 @@ fn feed_through_is_taken_out<T: Float>(theta: f64, off_hz: f64, drive_delay_s: f
 fn a_hold_integrates<T: Float>() {
     for (theta, sense) in [(0.01, 1.0), (-0.01, -1.0)] {
         let mut bench = Bench::<T>::with(Settings::default());
-        bench.state.wish(Wish::Hold);
+        bench.state.request(RequestedMode::Hold);
         bench.start(theta, 0.0);
         assert_eq!(bench.status.mode, Mode::Hold);
         let first = bench.state.seen.v_qs.to_f64();

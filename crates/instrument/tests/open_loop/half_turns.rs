@@ -1,6 +1,6 @@
 //! Half turns: counted while they are seen, and doubted, aloud, when they may not have been.
 
-use cvg_instrument::{Continuity, Mode, Wish};
+use cvg_instrument::{Continuity, Mode, RequestedMode};
 use cvg_model::Float;
 
 use super::Bench;
@@ -97,10 +97,10 @@ fn a_direction_that_is_lost_between_operation_and_operation_is_doubted<T: Float>
 fn a_start_is_no_loss<T: Float>() {
     let bench = Bench::<T>::running(0.2, 0.0);
     assert_eq!(bench.state.continuity, Continuity { unseen: 0, counting: true, lost: false });
-    // a wish for another mode neither
-    for (wish, mode) in [(Wish::Hold, Mode::Hold), (Wish::RingDown, Mode::RingDown)] {
+    // a request for another mode neither
+    for (requested, mode) in [(RequestedMode::Hold, Mode::Hold), (RequestedMode::RingDown, Mode::RingDown)] {
         let mut bench = Bench::<T>::running(0.2, 0.0);
-        bench.state.wish(wish);
+        bench.state.request(requested);
         bench.windows(10);
         assert!(bench.status.mode == mode && !bench.status.half_turns_lost, "{mode:?}");
         bench.phase_rad += 0.06;
@@ -136,6 +136,6 @@ in_both_precisions! {
     windows_that_nobody_saw_are_as_many_after_an_acknowledgement an_acknowledgement_shows_no_window;
     a_pattern_that_jumps_and_one_that_falls_silent_are_doubted a_jump_and_a_fault_are_doubted;
     a_direction_that_is_lost_while_it_locks_is_doubted a_direction_that_is_lost_between_operation_and_operation_is_doubted;
-    a_start_and_another_wish_lose_nothing a_start_is_no_loss;
+    a_start_and_another_request_lose_nothing a_start_is_no_loss;
     what_is_acknowledged_without_a_direction_is_not_lost_with_the_first at_rest_there_is_nothing_to_lose;
 }

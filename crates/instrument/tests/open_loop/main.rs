@@ -196,10 +196,10 @@ fn a_window_is_fresh_once_and_tells_its_envelope() {
 }
 
 fn stuck<T: Float>() {
-    for wish in [cvg_instrument::Wish::WholeAngle, cvg_instrument::Wish::Hold] {
+    for requested in [cvg_instrument::RequestedMode::WholeAngle, cvg_instrument::RequestedMode::Hold] {
         for channel in [0, 1] {
             let mut bench = Bench::<T>::with(Settings::default());
-            bench.state.wish(wish);
+            bench.state.request(requested);
             // the pattern at its heading, where a hold finds nothing to do
             bench.start(if channel == 0 { 0.02 } else { -0.02 }, 0.0);
             let constant = bench.vibration()[channel];
@@ -208,8 +208,8 @@ fn stuck<T: Float>() {
                     v[channel] = constant + 0.01;
                     v
                 })
-                .unwrap_or_else(|| panic!("{wish:?} {channel}: {:?}", bench.state.supervisor));
-            assert_eq!(fault, Fault::StuckChannel, "{wish:?} {channel} after {windows}");
+                .unwrap_or_else(|| panic!("{requested:?} {channel}: {:?}", bench.state.supervisor));
+            assert_eq!(fault, Fault::StuckChannel, "{requested:?} {channel} after {windows}");
         }
     }
 }

@@ -55,7 +55,7 @@ fn settings_are_taken_up_to_their_edges_and_refused_beyond_by_name() {
         assert_eq!(new(change, refused), (Some(name), Some(name)), "{name} = {refused}");
     }
     // a line of a fifth of it, to the fourth power, is no number of full precision in f32
-    let heard: Change = |s, v| s.heard_v = v;
+    let heard: Change = |s, v| s.detection_threshold_v = v;
     assert_eq!(new(heard, 1.7e-9), (None, None));
     assert_eq!(new(heard, 1e-9), (Some("least_v"), None));
     assert_eq!(new(heard, 1e-80), (Some("least_v"), Some("least_v")));

@@ -7,7 +7,7 @@
 //! A row is one control step: the envelope of a window, stamped with the window's middle, and the commands computed from
 //! it. Each run starts from rest and settles before t = 0.
 
-use cvg_instrument::{Mode, Settings, Tuning, Wish};
+use cvg_instrument::{Mode, RequestedMode, Settings, Tuning};
 use cvg_model::effects::EffectId;
 use cvg_model::resonator::Anisotropy;
 
@@ -117,7 +117,7 @@ fn record_run(scenario: &Scenario, device: &CarrierDevice, run: &Run) -> Result<
         #[allow(clippy::cast_precision_loss, reason = "2^53 samples are not reached")]
         let at = k as f64;
         if at >= off_at {
-            closed.state.wish(Wish::RingDown);
+            closed.state.request(RequestedMode::RingDown);
         }
         control_step(&mut closed, spring);
         if k % every == 0 {
@@ -166,11 +166,11 @@ pub(super) fn started(
     spring: Option<Spring>,
 ) -> Result<CarrierLoop<f64>, NotAtCarrier> {
     let mut closed = CarrierLoop::<f64>::new(device, settings).map_err(NotAtCarrier::Settings)?;
-    let (wish, operating) = match run {
-        Run::Ringdown { .. } => (Wish::Hold, Mode::Hold),
-        _ => (Wish::WholeAngle, Mode::WholeAngle),
+    let (requested, operating) = match run {
+        Run::Ringdown { .. } => (RequestedMode::Hold, Mode::Hold),
+        _ => (RequestedMode::WholeAngle, Mode::WholeAngle),
     };
-    closed.state.wish(wish);
+    closed.state.request(requested);
     closed.plant.set_rate(rate_dps.to_radians());
     for _ in 0..crate::closed_loop::samples(START_S + SETTLE_S, settings.window_s()) {
         control_step(&mut closed, spring);

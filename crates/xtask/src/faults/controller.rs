@@ -117,15 +117,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a lost phase is not counted",
         STEP,
-        "if too_many(state) { fail(state, Fault::NoLock) } else { enter(state, Mode::Lock, Orders::Snap) }",
-        "enter(state, Mode::Lock, Orders::Snap)",
+        "if too_many(state) { fail(state, Fault::NoLock) } else { enter(state, Mode::Lock, LoopCommand::Snap) }",
+        "enter(state, Mode::Lock, LoopCommand::Snap)",
         SUPERVISOR,
     ),
     fault(
         "windows in a row in which all was well are counted through one in which it was not",
         STEP,
-        "            state.windows = 0;\n        }\n        orders(state.mode)",
-        "        }\n        orders(state.mode)",
+        "            state.windows = 0;\n        }\n        command(state.mode)",
+        "        }\n        command(state.mode)",
         SUPERVISOR,
     ),
     fault(
@@ -182,8 +182,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a first lock counts the window before the phase was set",
         STEP,
-        "if state.windows == 1 {\n            return Orders::Snap;",
-        "if state.windows == 1 {\n            state.good = 1;\n            return Orders::Snap;",
+        "if state.windows == 1 {\n            return LoopCommand::Snap;",
+        "if state.windows == 1 {\n            state.good = 1;\n            return LoopCommand::Snap;",
         SUPERVISOR,
     ),
     fault(
@@ -201,9 +201,9 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "the short way goes on in a wish that is not fulfilled",
+        "the short way goes on in a request that is not fulfilled",
         STEP,
-        "Mode::Hold => state.wish == Wish::Hold,",
+        "Mode::Hold => state.requested == RequestedMode::Hold,",
         "Mode::Hold => true,",
         SUPERVISOR,
     ),
@@ -222,10 +222,10 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "rest that is wished forgets the name of the fault",
+        "rest that is requested forgets the name of the fault",
         STEP,
-        "SupervisorState { wish: Wish::Off, fault: state.fault, ..",
-        "SupervisorState { wish: Wish::Off, ..",
+        "SupervisorState { requested: RequestedMode::Off, fault: state.fault, ..",
+        "SupervisorState { requested: RequestedMode::Off, ..",
         SUPERVISOR,
     ),
     fault(
@@ -299,10 +299,10 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "a hold that is wished waits for a whole angle",
+        "a hold that is requested waits for a whole angle",
         "controller/src/supervisor/step.rs",
-        "                Wish::Hold => Mode::Hold,\n                Wish::RingDown => Mode::RingDown,\n                Wish::WholeAngle | Wish::Off => Mode::WholeAngle,\n            };\n            return",
-        "                Wish::Hold => Mode::WholeAngle,\n                Wish::RingDown => Mode::RingDown,\n                Wish::WholeAngle | Wish::Off => Mode::WholeAngle,\n            };\n            return",
+        "                RequestedMode::Hold => Mode::Hold,\n                RequestedMode::RingDown => Mode::RingDown,\n                RequestedMode::WholeAngle | RequestedMode::Off => Mode::WholeAngle,\n            };\n            return",
+        "                RequestedMode::Hold => Mode::WholeAngle,\n                RequestedMode::RingDown => Mode::RingDown,\n                RequestedMode::WholeAngle | RequestedMode::Off => Mode::WholeAngle,\n            };\n            return",
         SUPERVISOR,
     ),
     fault(
@@ -343,8 +343,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what is heard may be half of the amplitude",
         "controller/src/supervisor.rs",
-        "s.heard_v * 3.0 >= s.amplitude_v",
-        "s.heard_v * 2.0 >= s.amplitude_v",
+        "s.detection_threshold_v * 3.0 >= s.amplitude_v",
+        "s.detection_threshold_v * 2.0 >= s.amplitude_v",
         SUPERVISOR,
     ),
     fault(
@@ -362,7 +362,7 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "a new wish does not begin a start of its own",
+        "a new request does not begin a start of its own",
         "controller/src/supervisor/step.rs",
         "            state.trying = 0;\n            return enter",
         "            return enter",
@@ -371,15 +371,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what was heard is weighed over the time of listening",
         "controller/src/supervisor/step.rs",
-        "T::ratio(beat.windows, 1) * self.heard_2",
-        "count::<T>(state.windows) * self.heard_2",
+        "T::ratio(beat.windows, 1) * self.detection_threshold_2",
+        "count::<T>(state.windows) * self.detection_threshold_2",
         SUPERVISOR,
     ),
     fault(
         "a spin-up to a ring-down does not hold the pattern",
         "controller/src/supervisor/step.rs",
-        "hold: state.wish != Wish::WholeAngle, ring_down",
-        "hold: state.wish == Wish::Hold, ring_down",
+        "hold: state.requested != RequestedMode::WholeAngle, ring_down",
+        "hold: state.requested == RequestedMode::Hold, ring_down",
         SUPERVISOR,
     ),
     fault(
@@ -427,7 +427,7 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a coast that goes silent is locked",
         "controller/src/supervisor/step.rs",
-        "        if o.pendulum.e * T::ratio(4, 1) < self.heard_2 {\n            return enter(state, Mode::Listen",
+        "        if o.pendulum.e * T::ratio(4, 1) < self.detection_threshold_2 {\n            return enter(state, Mode::Listen",
         "        if o.pendulum.e < T::zero() {\n            return enter(state, Mode::Listen",
         SUPERVISOR,
     ),

@@ -244,8 +244,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what is heard and how long is swept are exchanged in C",
         "capi/src/lib.rs",
-        "heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
-        "heard_v: s.sweep_s,\n        sweep_s: s.heard_v,\n        readout: readout.get",
+        "detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
+        "detection_threshold_v: s.sweep_s,\n        sweep_s: s.detection_threshold_v,\n        readout: readout.get",
         C,
     ),
     fault(
@@ -256,10 +256,10 @@ pub(super) const FAULTS: &[Fault] = &[
         C,
     ),
     fault(
-        "wishes of a hold and a ring-down are exchanged in C",
+        "requests of a hold and a ring-down are exchanged in C",
         "capi/src/lib.rs",
-        "[Wish::WholeAngle, Wish::Hold, Wish::RingDown, Wish::Off]",
-        "[Wish::WholeAngle, Wish::RingDown, Wish::Hold, Wish::Off]",
+        "[RequestedMode::WholeAngle, RequestedMode::Hold, RequestedMode::RingDown, RequestedMode::Off]",
+        "[RequestedMode::WholeAngle, RequestedMode::RingDown, RequestedMode::Hold, RequestedMode::Off]",
         C,
     ),
     fault(
@@ -300,8 +300,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the delays of readout and drive are exchanged in C",
         "capi/src/lib.rs",
-        "readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
-        "readout_delay_s: s.drive_delay_s,\n        drive_delay_s: s.readout_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
+        "readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
+        "readout_delay_s: s.drive_delay_s,\n        drive_delay_s: s.readout_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout.get",
         C,
     ),
     fault(

@@ -285,7 +285,13 @@ pub(super) const FAULTS: &[Fault] = &[
         "if limit_rad_s * window_s >= TAU {",
         OPEN_LOOP,
     ),
-    fault("the least line is what is heard", "instrument/src/settings.rs", "0.2 * s.heard_v", "s.heard_v", JOINED),
+    fault(
+        "the least line is what is heard",
+        "instrument/src/settings.rs",
+        "0.2 * s.detection_threshold_v",
+        "s.detection_threshold_v",
+        JOINED,
+    ),
     fault(
         "the holding loop's reach is in volts",
         "instrument/src/settings.rs",
@@ -338,8 +344,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the detuning's integral outlives a snap",
         "instrument/src/step.rs",
-        "Orders::Lock => correction_rad_s = self.phase.step(&mut state.lock, p).rad_s,",
-        "Orders::Lock => {}",
+        "LoopCommand::Lock => correction_rad_s = self.phase.step(&mut state.lock, p).rad_s,",
+        "LoopCommand::Lock => {}",
         JOINED,
     ),
     fault(

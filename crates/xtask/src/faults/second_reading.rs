@@ -234,8 +234,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a vibration that rang down goes into operation at once",
         "controller/src/supervisor/step.rs",
-        "let next = if low { Mode::SpinUp } else { wished };",
-        "let next = wished;",
+        "let next = if low { Mode::SpinUp } else { requested };",
+        "let next = requested;",
         SUPERVISOR,
     ),
     fault(
@@ -416,8 +416,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a vibration is followed from ten times what is heard",
         "instrument/src/settings.rs",
-        "0.2 * s.heard_v)?",
-        "2.0 * s.heard_v)?",
+        "0.2 * s.detection_threshold_v)?",
+        "2.0 * s.detection_threshold_v)?",
         COMPOSITION,
     ),
     fault(

@@ -146,15 +146,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the hold is at zero in C",
         "capi/src/lib.rs",
-        "        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
-        "        hold_rad: 0.0,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        hold_rad: 0.0,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
         C,
     ),
     fault(
         "the rate loop has the phase loop's tuning in C",
         "capi/src/lib.rs",
-        "        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
-        "        rate: tuning(s.phase),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        rate: tuning(s.phase),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
         C,
     ),
     fault(

@@ -9,15 +9,15 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "energy and quadrature of the default are exchanged in C",
         "capi/src/lib.rs",
-        "energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: core",
-        "energy: tuning(s.quadrature),\n        quadrature: tuning(s.energy),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: core",
+        "energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: core",
+        "energy: tuning(s.quadrature),\n        quadrature: tuning(s.energy),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: core",
         SAME_AS_RUST,
     ),
     fault(
         "the range of the converters is their limit in C",
         "capi/src/lib.rs",
-        "        window: s.window,\n        adc_full_scale_v: s.adc_full_scale_v,\n        dac_limit_v: s.dac_limit_v,\n        readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
-        "        window: s.window,\n        adc_full_scale_v: s.dac_limit_v,\n        dac_limit_v: s.adc_full_scale_v,\n        readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        heard_v: s.heard_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        window: s.window,\n        adc_full_scale_v: s.adc_full_scale_v,\n        dac_limit_v: s.dac_limit_v,\n        readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
+        "        window: s.window,\n        adc_full_scale_v: s.dac_limit_v,\n        dac_limit_v: s.adc_full_scale_v,\n        readout_delay_s: s.readout_delay_s,\n        drive_delay_s: s.drive_delay_s,\n        amplitude_v: s.amplitude_v,\n        drive_per_s_v: s.drive_per_s_v,\n        energy: tuning(s.energy),\n        quadrature: tuning(s.quadrature),\n        phase: tuning(s.phase),\n        rate: tuning(s.rate),\n        hold_rad: s.hold_rad,\n        fastest_rad_s: s.fastest_rad_s,\n        detection_threshold_v: s.detection_threshold_v,\n        sweep_s: s.sweep_s,\n        readout: readout",
         SAME_AS_RUST,
     ),
     fault(

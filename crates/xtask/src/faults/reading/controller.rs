@@ -74,8 +74,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "what is heard is an amplitude and not its square",
         "controller/src/supervisor.rs",
-        "heard_2: T::from_f64(s.heard_v * s.heard_v)",
-        "heard_2: T::from_f64(s.heard_v)",
+        "detection_threshold_2: T::from_f64(s.detection_threshold_v * s.detection_threshold_v)",
+        "detection_threshold_2: T::from_f64(s.detection_threshold_v)",
         SUPERVISOR,
     ),
     fault(
@@ -114,7 +114,7 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "rest that is wished keeps its starts",
+        "rest that is requested keeps its starts",
         "controller/src/supervisor/step.rs",
         "fault: state.fault, ..SupervisorState::default() };",
         "fault: state.fault, starts: state.starts, ..SupervisorState::default() };",
@@ -135,10 +135,10 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "a wish that has to spin up holds on the way",
+        "a request that has to spin up holds on the way",
         "controller/src/supervisor/step.rs",
-        "return enter(state, next, orders(next));",
-        "return enter(state, next, orders(wished));",
+        "return enter(state, next, command(next));",
+        "return enter(state, next, command(requested));",
         SUPERVISOR,
     ),
     fault(
@@ -186,8 +186,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a lock counts a silent window as its first",
         "controller/src/supervisor/step.rs",
-        "        if state.windows == 1 {\n            return Orders::Snap;",
-        "        if state.windows <= 2 {\n            return Orders::Snap;",
+        "        if state.windows == 1 {\n            return LoopCommand::Snap;",
+        "        if state.windows <= 2 {\n            return LoopCommand::Snap;",
         SUPERVISOR,
     ),
     fault(
@@ -212,9 +212,9 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "operation goes on whatever is wished",
+        "operation goes on whatever is requested",
         "controller/src/supervisor/step.rs",
-        "matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.wish == Wish::of(state.mode);",
+        "matches!(state.mode, Mode::WholeAngle | Mode::Hold) && state.requested == RequestedMode::of(state.mode);",
         "matches!(state.mode, Mode::WholeAngle | Mode::Hold);",
         SUPERVISOR,
     ),
@@ -235,22 +235,22 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a lock that falls silent is a fault",
         "controller/src/supervisor/step.rs",
-        "        if p.e * T::ratio(4, 1) < self.heard_2 {\n            return enter(state, Mode::Listen, Orders::Rest);\n        }\n        if state.windows == 1 {",
-        "        if p.e * T::ratio(4, 1) < self.heard_2 {\n            return fail(state, Fault::NoLock);\n        }\n        if state.windows == 1 {",
+        "        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {\n            return enter(state, Mode::Listen, LoopCommand::Rest);\n        }\n        if state.windows == 1 {",
+        "        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {\n            return fail(state, Fault::NoLock);\n        }\n        if state.windows == 1 {",
         SUPERVISOR,
     ),
     fault(
         "a lock that is found with its last window is none",
         "controller/src/supervisor/step.rs",
-        "        if state.good >= ENOUGH {\n            return enter(state, Mode::SpinUp, Orders::Run { hold: false, ring_down: false });\n        }\n        if state.windows >= self.lock {\n            return fail(state, Fault::NoLock);\n        }",
-        "        if state.windows >= self.lock {\n            return fail(state, Fault::NoLock);\n        }\n        if state.good >= ENOUGH {\n            return enter(state, Mode::SpinUp, Orders::Run { hold: false, ring_down: false });\n        }",
+        "        if state.good >= ENOUGH {\n            return enter(state, Mode::SpinUp, LoopCommand::Run { hold: false, ring_down: false });\n        }\n        if state.windows >= self.lock {\n            return fail(state, Fault::NoLock);\n        }",
+        "        if state.windows >= self.lock {\n            return fail(state, Fault::NoLock);\n        }\n        if state.good >= ENOUGH {\n            return enter(state, Mode::SpinUp, LoopCommand::Run { hold: false, ring_down: false });\n        }",
         SUPERVISOR,
     ),
     fault(
         "in operation what is heard may not be quieter",
         "controller/src/supervisor/step.rs",
-        "            return interrupted(state, named(o, Fault::DeadChannel));\n        }\n        if p.e * T::ratio(4, 1) < self.heard_2 {",
-        "            return interrupted(state, named(o, Fault::DeadChannel));\n        }\n        if p.e < self.heard_2 {",
+        "            return interrupted(state, named(o, Fault::DeadChannel));\n        }\n        if p.e * T::ratio(4, 1) < self.detection_threshold_2 {",
+        "            return interrupted(state, named(o, Fault::DeadChannel));\n        }\n        if p.e < self.detection_threshold_2 {",
         SUPERVISOR,
     ),
     fault(

@@ -7,10 +7,10 @@ const LEARNING: (&str, &str) = ("cvg-capi", "calibrator_same_as_rust");
 
 pub(super) const FAULTS: &[Fault] = &[
     fault(
-        "any wish is one of four in C",
+        "any requested is one of four in C",
         "capi/src/lib.rs",
-        "wishes.get(usize::from(wish))",
-        "wishes.get(usize::from(wish) % 4)",
+        "requests.get(usize::from(requested))",
+        "requests.get(usize::from(requested) % 4)",
         C,
     ),
     fault(

@@ -107,10 +107,10 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "rest that is wished forgets the fault",
+        "rest that is requested forgets the fault",
         "controller/src/supervisor/step.rs",
-        "SupervisorState { wish: Wish::Off, fault: state.fault, ..SupervisorState::default() }",
-        "SupervisorState { wish: Wish::Off, ..SupervisorState::default() }",
+        "SupervisorState { requested: RequestedMode::Off, fault: state.fault, ..SupervisorState::default() }",
+        "SupervisorState { requested: RequestedMode::Off, ..SupervisorState::default() }",
         SUPERVISOR,
     ),
     fault(
@@ -254,17 +254,17 @@ pub(super) const FAULTS: &[Fault] = &[
         SUPERVISOR,
     ),
     fault(
-        "a hold goes on as what was wished before",
+        "a hold goes on as what was requested before",
         "controller/src/supervisor/step.rs",
-        "Mode::Hold => state.wish == Wish::Hold,",
-        "Mode::Hold => state.wish != Wish::Off,",
+        "Mode::Hold => state.requested == RequestedMode::Hold,",
+        "Mode::Hold => state.requested != RequestedMode::Off,",
         SUPERVISOR,
     ),
     fault(
         "what is heard may be exactly a third of the amplitude",
         "controller/src/supervisor.rs",
-        "if s.heard_v * 3.0 >= s.amplitude_v {",
-        "if s.heard_v * 3.0 > s.amplitude_v {",
+        "if s.detection_threshold_v * 3.0 >= s.amplitude_v {",
+        "if s.detection_threshold_v * 3.0 > s.amplitude_v {",
         SUPERVISOR,
     ),
     fault(
@@ -319,8 +319,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "exactly what is heard is heard",
         "controller/src/supervisor/step.rs",
-        "sum > T::ratio(beat.windows, 1) * self.heard_2",
-        "sum >= T::ratio(beat.windows, 1) * self.heard_2",
+        "sum > T::ratio(beat.windows, 1) * self.detection_threshold_2",
+        "sum >= T::ratio(beat.windows, 1) * self.detection_threshold_2",
         SUPERVISOR,
     ),
     fault(
@@ -333,8 +333,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "without a beat it rests",
         "controller/src/supervisor/step.rs",
-        "else { return Orders::Listen };",
-        "else { return Orders::Rest };",
+        "else { return LoopCommand::Listen };",
+        "else { return LoopCommand::Rest };",
         SUPERVISOR,
     ),
     fault(
@@ -368,8 +368,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "a coast ends without a snap",
         "controller/src/supervisor/step.rs",
-        "enter(state, Mode::Lock, Orders::Snap)\n    }\n\n    //=",
-        "enter(state, Mode::Lock, Orders::Lock)\n    }\n\n    //=",
+        "enter(state, Mode::Lock, LoopCommand::Snap)\n    }\n\n    //=",
+        "enter(state, Mode::Lock, LoopCommand::Lock)\n    }\n\n    //=",
         SUPERVISOR,
     ),
     fault(

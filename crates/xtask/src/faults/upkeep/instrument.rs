@@ -87,8 +87,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "at rest the oscillator goes back to its nominal frequency",
         "instrument/src/correction.rs",
-        "Orders::Run { .. } => return kept,",
-        "Orders::Run { .. } => return T::zero(),",
+        "            return kept;\n",
+        "            return T::zero();\n",
         JOINED,
     ),
     fault(
@@ -192,8 +192,8 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "faults are forgotten after a second",
         "instrument/src/settings.rs",
-        "forget_s: 10.0,",
-        "forget_s: 1.0,",
+        "fault_memory_s: 10.0,",
+        "fault_memory_s: 1.0,",
         JOINED,
     ),
     fault(
