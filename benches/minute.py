@@ -11,6 +11,7 @@ system has it cached. It fails where one takes half of the recording's duration,
 import argparse
 import json
 import os
+import re
 import statistics
 import subprocess
 import sys
@@ -61,13 +62,14 @@ def as_hdf5(cvg, name):
     raw, folder = campaign(cvg, name, "f32"), Path(tempfile.gettempdir()) / f"cvg-minute-{name}-h5"
     if not (folder / "campaign.toml").exists():
         folder.mkdir(exist_ok=True)
-        xy = np.fromfile(raw / "run.f32", dtype="<f4").reshape(-1, 2)
+        text, _, raw_text = (raw / "campaign.toml").read_text().partition("[run.raw]")
+        names = json.loads(re.search(r"columns = (\[.*\])", raw_text)[1])
+        columns = np.fromfile(raw / "run.f32", dtype="<f4").reshape(-1, len(names))
         with h5py.File(folder / "run.h5", "w") as file:
-            file.create_dataset("t_s", data=np.arange(len(xy)) / SAMPLE_HZ)
-            file.create_dataset("x_v", data=xy[:, 0])
-            file.create_dataset("y_v", data=xy[:, 1])
-        lines = (raw / "campaign.toml").read_text().replace("run.f32", "run.h5").splitlines()
-        (folder / "campaign.toml").write_text("\n".join(line for line in lines if not line.startswith("raw")))
+            file.create_dataset("t_s", data=np.arange(len(columns)) / SAMPLE_HZ)
+            for channel, column in zip(names, columns.T):
+                file.create_dataset(channel, data=column)
+        (folder / "campaign.toml").write_text(text.replace("run.f32", "run.h5"))
     return folder
 
 

@@ -40,6 +40,8 @@ struct Outcome {
     over_floor: f64,
     /// of each rightly named effect: parameters whose interval holds the truth, and all with an interval
     parameters: Vec<(&'static str, [usize; 2])>,
+    /// intervals that do not hold the truth, to be read
+    misses: Vec<String>,
     /// the same for detection ratio, actuation ratio and angular gain
     gains: [[usize; 2]; 3],
     details: String,
@@ -76,6 +78,7 @@ fn outcome(bench: &Bench, seed: u64, coloured: Option<Coloured>) -> Outcome {
         claimed: Vec::new(),
         over_floor: f64::INFINITY,
         parameters: Vec::new(),
+        misses: Vec::new(),
         gains: [[0; 2]; 3],
         details: String::new(),
         setup,
@@ -95,15 +98,23 @@ fn outcome(bench: &Bench, seed: u64, coloured: Option<Coloured>) -> Outcome {
         outcome.answer = "nothing".into();
     }
     outcome.over_floor = over_floor(&identified);
-    let named = outcome.setup.drawn.iter().filter(|d| outcome.names(d));
-    outcome.parameters = named.map(|d| (d.id(), parameters_held(&identified, d.effect.id, &d.effect.values))).collect();
+    let named: Vec<Drawn> = outcome.setup.drawn.iter().filter(|d| outcome.names(d)).copied().collect();
+    for d in named {
+        let held = parameters_held(&identified, d.effect.id, &d.effect.values, &mut outcome.misses);
+        outcome.parameters.push((d.id(), held));
+    }
     outcome.gains = gains_held(&identified, &outcome.setup.settings);
     outcome.details = details(&identified);
     outcome
 }
 
 /// Of the parameters of `id` that are reported with an interval: those whose interval holds the truth, and all.
-fn parameters_held(identified: &Identification, id: EffectId, truth: &Values<f64>) -> [usize; 2] {
+fn parameters_held(
+    identified: &Identification,
+    id: EffectId,
+    truth: &Values<f64>,
+    misses: &mut Vec<String>,
+) -> [usize; 2] {
     let description = id.description();
     let reported = &identified.report.effects.iter().find(|e| e.id == description.id).unwrap().parameters;
     let mut count = [0; 2];
@@ -113,6 +124,9 @@ fn parameters_held(identified: &Identification, id: EffectId, truth: &Values<f64
             let near = period.map_or(truth, |period| value + wrapped(truth - value, period));
             count[1] += 1;
             count[0] += usize::from(low <= near && near <= high);
+            if !(low..=high).contains(&near) {
+                misses.push(format!("{} {name} {value:.4e} [{low:.4e}, {high:.4e}], set {near:.4e}", description.id));
+            }
         }
     };
     for shown in description.shown {
@@ -220,6 +234,10 @@ fn print_flaws(outcomes: &[Outcome]) {
 }
 
 fn print_intervals(outcomes: &[Outcome]) {
+    for o in outcomes.iter().filter(|o| !o.misses.is_empty()) {
+        let drawn: Vec<String> = o.setup.drawn.iter().map(described).collect();
+        println!("seed {}: {}: {}", o.seed, drawn.join(", "), o.misses.join("; "));
+    }
     let gain = |which: usize| total(outcomes.iter().map(|o| o.gains[which]));
     println!(
         "intervals that hold the truth: detection ratio {:?}, actuation ratio {:?}, angular gain {:?}",

@@ -4,7 +4,7 @@
 
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::{Campaign, Recording, Role, Run};
-use cvg_calibration::{EffectText, Identification, Options, Origin, compensate, identify};
+use cvg_calibration::{Answer, EffectText, Identification, Options, Origin, answer, compensate, identify};
 use cvg_model::effects::EffectId;
 use cvg_tests::angle_sensor::{Noise, find, held_out, run, sensor};
 use cvg_tests::bench::trials;
@@ -213,6 +213,16 @@ fn a_text_that_asks_for_more_than_the_channels_has_no_part_and_a_warning_says_wh
         let said = with.report.warnings.iter().find(|w| w.contains("had no part in this"));
         assert!(said.is_some_and(|w| w.contains("ask for x, y")), "{:?}", with.report.warnings);
     }
+}
+
+#[test]
+fn without_a_reference_a_warning_says_that_a_text_had_no_part() {
+    let mut campaign = campaign(1, 1.0, |z| z);
+    campaign.runs.iter_mut().for_each(|run| run.recording.table_deg = None);
+    let options = Options { effects: vec![admitted(SQUARE)], ..Options::default() };
+    let Ok(Answer::Surveyed(told)) = answer(campaign, &options) else { panic!("two channels alone are surveyed") };
+    let said: Vec<&String> = told.report.warnings.iter().filter(|w| w.contains("had no part in this")).collect();
+    assert!(said.len() == 1 && said[0].contains("my-square"), "{:?}", told.report.warnings);
 }
 
 #[test]

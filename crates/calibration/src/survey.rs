@@ -7,7 +7,7 @@ use crate::diagnostics::at_rest;
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
 use crate::identification::identify_with_plots;
-use crate::identified::{Identification, Options};
+use crate::identified::{Identification, Options, not_tried};
 use crate::recording::{Campaign, Run};
 use crate::report::calibration::Calibration;
 use crate::report::recorded::run_report;
@@ -49,7 +49,12 @@ struct Rest {
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
 pub fn answer(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
     if virtual_precession::serves(&campaign) {
-        return virtual_precession::identify(&campaign, options).map(|s| Answer::Surveyed(Box::new(s)));
+        let mut surveyed = virtual_precession::identify(&campaign, options)?;
+        surveyed
+            .report
+            .warnings
+            .extend(not_tried(&options.effects, "effects as text do not compete in virtual precession"));
+        return Ok(Answer::Surveyed(Box::new(surveyed)));
     }
     let hint = likeness::hint(&campaign);
     let files = provenance::files(&campaign);
@@ -96,6 +101,8 @@ fn survey(
     let mut report = Survey::new(campaign.device.clone(), instrument, inputs, runs);
     report.runs.iter_mut().zip(ratios).for_each(|(run, ratio)| run.detection_gain_ratio = ratio);
     report.warnings = campaign.all_warnings().map(str::to_owned).collect();
+    let why = "effects as text compete where an angle is measured against a reference, and here is none";
+    report.warnings.extend(not_tried(&options.effects, why));
     let (mut calibration, mut curve) = (None, None);
     if !campaign.runs.is_empty() {
         (options.progress)("fitting what the channels draw");

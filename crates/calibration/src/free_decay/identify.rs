@@ -8,7 +8,7 @@ use super::model::{Start, Term};
 use super::phase::phase;
 use super::report::{Errors, Finding, report};
 use super::runs::DecayRun;
-use super::selection::{Chosen, choose, instead, is_declared, is_sound, unseen_phase};
+use super::selection::{Chosen, choose, instead, is_declared, is_sound, unseen_near_one_angle, unseen_phase};
 use crate::error::Refusal;
 use crate::identified::{Identification, Options};
 use crate::recording::{Campaign, RunKind};
@@ -137,12 +137,15 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     // where a phase explains them as well by itself, what lies between is held by that
     let is_held = !chosen.many_angles || instead.iter().any(|other| other.by == Term::Phase);
     let unseen = if is_held { None } else { unseen_phase(&final_fit, all) };
+    let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
+    let detuning = phase.as_ref().map_or(0.0, |p| p.per_energy.0.abs() + 2.0 * p.per_energy.1);
+    let hidden = if chosen.many_angles { Vec::new() } else { unseen_near_one_angle(&final_fit, detuning, all) };
     final_fit = instead.iter().fold(final_fit, |f, other| f.or(&other.model));
-    final_fit = unseen.iter().fold(final_fit, Fit::beside);
+    let seen = final_fit.clone();
+    final_fit = unseen.iter().chain(&hidden).fold(final_fit, Fit::beside);
     let final_declared =
         if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };
-    let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
-    let finding = Finding { chosen, fit: final_fit, declared: final_declared, instead, unseen, phase, errors };
+    let finding = Finding { chosen, fit: final_fit, seen, declared: final_declared, instead, unseen, phase, errors };
     report(head, &finding, &fitted, &held, with_plots)
 }
 

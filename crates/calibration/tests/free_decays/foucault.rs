@@ -50,6 +50,8 @@ pub(crate) struct Pendulum {
     pub(crate) spherical: bool,
     /// Δω at 45° to the swing, rad/s: makes quadrature grow
     pub(crate) split_rad_s: f64,
+    /// Δ(1/τ) over 1/τ, at 45° to the swing, where it turns the pattern
+    pub(crate) uneven: f64,
     pub(crate) noise_px: f64,
     pub(crate) camera: Camera,
 }
@@ -66,6 +68,7 @@ impl Pendulum {
         let omega_2 = (std::f64::consts::TAU * HZ).powi(2);
         let earth = (RATE_DPH / 3600.0).to_radians();
         let damping = 2.0 / 2500.0;
+        let uneven = 0.5 * self.uneven * damping;
         let pull = if self.spherical {
             let l = Self::length_m();
             let z = -(l * l - x * x - y * y).sqrt();
@@ -80,8 +83,8 @@ impl Pendulum {
         [
             u,
             v,
-            -pull * x + 2.0 * earth * v - damping * u + split * y,
-            -pull * y - 2.0 * earth * u - damping * v + split * x,
+            -pull * x + 2.0 * earth * v - damping * u - uneven * v + split * y,
+            -pull * y - 2.0 * earth * u - damping * v - uneven * u + split * x,
         ]
     }
 

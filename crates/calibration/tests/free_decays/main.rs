@@ -193,7 +193,7 @@ fn filmed(pendulum: &Pendulum, seed: u64) -> Report {
 
 #[test]
 fn airys_precession_is_found_in_the_film_of_a_pendulum_and_the_rate_put_right() {
-    let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::FAR };
+    let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, uneven: 0.0, noise_px: 0.3, camera: Camera::FAR };
     for seed in 1..=6 {
         let report = filmed(&pendulum, seed);
         let decay = report.decay.as_ref().unwrap();
@@ -201,11 +201,13 @@ fn airys_precession_is_found_in_the_film_of_a_pendulum_and_the_rate_put_right() 
         let c = parameter(&report, "spring-isotropic", "c");
         let l = Pendulum::length_m() * foucault::PIXELS_PER_M;
         let airy = 3.0 / 16.0 * std::f64::consts::TAU * foucault::HZ / (l * l);
-        assert!((c.value - airy).abs() < 2.0 * c.half_width() && c.half_width() < 0.05 * airy, "{airy}: {c:?}");
+        assert!((c.value - airy).abs() < 2.0 * c.half_width() && c.half_width() < 0.1 * airy, "{airy}: {c:?}");
         let (rate, without) = (decay.precession_dph, decay.precession_dph_declared);
-        assert!((rate.value + RATE_DPH).abs() < 2.0 * rate.half_width(), "{rate:?}");
+        assert!((rate.value + RATE_DPH).abs() < 0.3, "{rate:?}");
         assert!((without.value + RATE_DPH).abs() > 3.0, "{without:?}");
-        assert!((report.angular_gain.value - 1.0).abs() < 0.03, "{:?}", report.angular_gain);
+        // a damping that differs between two axes by a tenth of itself would pass for half of the Earth's rate
+        assert!((3.0..6.0).contains(&rate.half_width()), "{rate:?}");
+        assert!(!report.angular_gain.is_told(), "{:?}", report.angular_gain);
         let [constant, _, after] = decay.rms_deg;
         println!("{constant:.4} {after:.4} {rate:?} {without:?}");
         assert!(after < 0.2 * constant, "{constant} {after}");
@@ -225,7 +227,8 @@ fn the_rate_of_a_filmed_pendulum_is_right_through_a_tilted_camera_beside_it() {
         Camera { aspect: 1.02, ..Camera::NEAR },
     ];
     for (seed, camera) in (1..).zip(cameras) {
-        let report = filmed(&Pendulum { spherical: true, split_rad_s: 2.5e-5, noise_px: 0.3, camera }, seed);
+        let report =
+            filmed(&Pendulum { spherical: true, split_rad_s: 2.5e-5, uneven: 0.0, noise_px: 0.3, camera }, seed);
         let decay = report.decay.as_ref().unwrap();
         let rate = decay.precession_dph;
         println!(
@@ -240,17 +243,42 @@ fn the_rate_of_a_filmed_pendulum_is_right_through_a_tilted_camera_beside_it() {
         assert_eq!(caused.collect::<Vec<_>>(), ["spring-isotropic"], "{:?}", discovered(&report));
         // near one angle nothing tells a scale of y from the precession: the report says how much of it there is
         assert!(report.warnings.iter().any(|w| w.contains("a scale of y that is 1 % larger")), "{:?}", report.warnings);
-        assert!((rate.value + RATE_DPH * camera.aspect).abs() < 2.0 * rate.half_width(), "{rate:?}");
+        assert!((rate.value + RATE_DPH * camera.aspect).abs() < 0.5, "{rate:?}");
     }
+}
+
+/// Near one angle a damping that differs between two axes is a precession, and nothing in the film tells it from the Earth's.
+#[test]
+fn the_interval_of_a_filmed_pendulums_rate_holds_an_uneven_damping() {
+    for (seed, uneven) in [(1, 0.05), (2, -0.08), (3, 0.1)] {
+        let pendulum = Pendulum { spherical: true, split_rad_s: 2.5e-5, uneven, noise_px: 0.3, camera: Camera::FAR };
+        let report = filmed(&pendulum, seed);
+        let rate = report.decay.as_ref().unwrap().precession_dph;
+        assert!((rate.value + RATE_DPH).abs() > 1.0, "{rate:?}");
+        assert!(is_within(-RATE_DPH, &rate), "{rate:?}");
+        let said = report.warnings.iter().find(|w| w.contains("near one angle")).unwrap();
+        assert!(said.contains("an anisodamping of a tenth of 1/τ"), "{said}");
+    }
+}
+
+/// Quadrature so small that Airy's precession is below what is claimed is held by the interval, as far as the frequency says
+/// that there is such a spring.
+#[test]
+fn the_interval_of_a_filmed_pendulums_rate_holds_a_precession_that_is_too_small_to_be_named() {
+    let pendulum = Pendulum { spherical: true, split_rad_s: 1e-6, uneven: 0.0, noise_px: 1.0, camera: Camera::FAR };
+    let report = filmed(&pendulum, 5);
+    assert_eq!(discovered(&report), [""; 0]);
+    let rate = report.decay.as_ref().unwrap().precession_dph;
+    assert!(is_within(-RATE_DPH, &rate), "{rate:?}");
 }
 
 #[test]
 fn a_bowl_without_airys_precession_is_not_said_to_have_it() {
-    let bowl = Pendulum { spherical: false, split_rad_s: 2.5e-5, noise_px: 0.3, camera: Camera::FAR };
+    let bowl = Pendulum { spherical: false, split_rad_s: 2.5e-5, uneven: 0.0, noise_px: 0.3, camera: Camera::FAR };
     for seed in 1..=12 {
         let report = filmed(&bowl, seed);
         assert_eq!(discovered(&report), [""; 0], "{:?}", report.effects);
         let rate = report.decay.unwrap().precession_dph;
-        assert!((rate.value + RATE_DPH).abs() < 2.0 * rate.half_width(), "{rate:?}");
+        assert!((rate.value + RATE_DPH).abs() < 0.3, "{rate:?}");
     }
 }
