@@ -375,49 +375,6 @@ fn a_product_of_the_channels_is_corrected_where_most_runs_agree() {
     is_corrected(&identified);
 }
 
-/// What no proposal of one harmonic is: prints what is left of each before and after it is fed back.
-#[test]
-#[ignore = "a measurement"]
-fn measure_what_is_left() {
-    const ZONE_V: f64 = 8e-4;
-    let read = |re: f64, im: f64| {
-        let r = (ZONE_V / re.hypot(im)).min(1.0);
-        let share = 1.0 - std::f64::consts::FRAC_2_PI * (r.asin() + r * (1.0 - r * r).sqrt());
-        (re * share, im * share)
-    };
-    let zone = read_otherwise(plain_paper(), |_, e| {
-        let ((x_c, x_s), (y_c, y_s)) = (read(e.x_c, e.x_s), read(e.y_c, e.y_s));
-        Envelope::new(x_c, x_s, y_c, y_s)
-    });
-    let product =
-        read_otherwise(plain_paper(), |_, e| Envelope::new(e.x_c, e.x_s, e.y_c + 2e-3 * e.x_c * e.y_c, e.y_s));
-    let squared = read_otherwise(plain_paper(), |s, e| {
-        let g = 1.0 + 2.0 * SIZE * (s.rate_rad_s / 8.7).powi(2);
-        Envelope::new(e.x_c, e.x_s, g * e.y_c, g * e.y_s)
-    });
-    let bilinear = recorded(plain_paper(), |s| 3.0 * SIZE * s.theta.cos().abs() * 8.7 / s.rate_rad_s);
-    for (name, folder) in [("zone", zone), ("product", product), ("squared", squared), ("bilinear", bilinear)] {
-        let one = identify_folder(folder.path()).unwrap();
-        println!(
-            "{name}: {:?} + {:?} {:.3}",
-            found(&one, Origin::Discovered),
-            found(&one, Origin::Empirical),
-            over_floor(&one)
-        );
-        for p in &one.report.proposals {
-            println!("{}", p.to_text());
-        }
-        let again = fed_back(&folder, &one);
-        println!(
-            "{name} again: {:?} + {:?} {:.3}",
-            found(&again, Origin::Discovered),
-            found(&again, Origin::Empirical),
-            over_floor(&again)
-        );
-        println!("{:#?}", one.report.unexplained);
-    }
-}
-
 /// What is proposed, fed back, corrects the angle: one kind always, all of them with CVG_TRIALS=7.
 #[test]
 fn proposals_that_are_fed_back_correct_the_angle() {
