@@ -42,3 +42,42 @@ fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed
         assert!(report.warnings.is_empty(), "{:?}", report.warnings);
     }
 }
+
+/// A staircase of rates, each for 12 s and reached within a second, as one run; the scale factor at each rate, the bias.
+fn staircase(rates_dps: &[f64], of: impl Fn(f64) -> f64, seed: u64) -> Run {
+    let (mut noise, dt) = (Noise::new(seed), 0.01);
+    let (mut rate, mut theta, mut table) = (0.0, 0.0, 0.0);
+    let [mut theta_deg, mut table_deg] = [Vec::new(), Vec::new()];
+    for target in rates_dps {
+        let ramp = (target - rate) / 100.0;
+        for row in 0..1200 {
+            rate = if row < 100 { rate + ramp } else { *target };
+            table += rate * dt;
+            theta += (of(rate) * rate + BIAS_DPS + 0.002 * noise.sample()) * dt;
+            table_deg.push(table);
+            theta_deg.push(theta);
+        }
+    }
+    let t_s = (0..theta_deg.len()).map(|i| dt * f64::from(u32::try_from(i).unwrap())).collect();
+    let (table_deg, theta_deg) = (Some(table_deg), Some(theta_deg));
+    run("staircase.csv", Role::Fit, Recording { t_s, table_deg, theta_deg, ..Recording::default() })
+}
+
+#[test]
+fn a_staircase_of_rates_in_one_run_tells_as_much_and_no_slip_or_lag_is_made_of_it() {
+    let (nonlinearity, asymmetry) = (200.0, 300.0);
+    let of = |rate: f64| 1.0 + 1e-6 * (nonlinearity * (rate.abs() - 50.0) / 250.0 + 0.5 * asymmetry * rate.signum());
+    // the last quarter is held out
+    let rates = [50.0, -50.0, 100.0, -100.0, 200.0, -200.0, 300.0, -300.0, 150.0, -150.0, 250.0];
+    for seed in 0..4 {
+        let runs = vec![staircase(&rates, of, seed)];
+        let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
+        let report = identified(campaign).report;
+        let holds = |e: Estimate, planted: f64| e.ci95[0] <= planted && planted <= e.ci95[1];
+        let scale = report.scale_factor.unwrap();
+        assert!(holds(scale.nonlinearity_ppm, nonlinearity), "{scale:?}");
+        assert!(holds(scale.asymmetry_ppm, asymmetry) && scale.asymmetry_ppm.half_width() < 50.0, "{scale:?}");
+        assert!(report.effects.iter().all(|e| e.id != "angle-latency"), "{:?}", report.effects);
+        assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+    }
+}

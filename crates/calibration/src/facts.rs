@@ -492,7 +492,7 @@ pub struct Report {
     pub decomposition: Vec<Share>,
     /// effects that are proposed for the library, each in the form of an effect file
     pub proposals: Vec<EffectText>,
-    /// how the scale factor goes with the rate; null where fewer than three rates of both senses are there
+    /// how the scale factor goes with the rate; null where fewer than four rates of both senses are there
     pub scale_factor: Option<ScaleFactor>,
     /// how far the input axis is off the plane across other axes; absent without a run about one
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

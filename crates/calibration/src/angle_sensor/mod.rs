@@ -20,6 +20,7 @@ mod rate_alone;
 mod rate_deviations;
 mod rate_finding;
 pub(crate) mod rate_gyroscope;
+mod rate_nonlinearity;
 mod rate_regression;
 mod rate_runs;
 mod readout;

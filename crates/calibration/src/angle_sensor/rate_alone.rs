@@ -17,7 +17,7 @@ pub(crate) struct Alone {
 }
 
 /// Runs whose mean speeds differ by less than this share turn at one speed.
-const SAME_SPEED: f64 = 0.02;
+pub(super) const SAME_SPEED: f64 = 0.02;
 
 impl RateGyroscope {
     /// What this run tells by itself, beside those that were fitted; `None` where it has too few rows to leave parts of them out.
@@ -66,22 +66,6 @@ impl RateGyroscope {
     pub(super) fn deviation(&self, term: Term) -> f64 {
         let of_terms = self.terms.iter().find(|t| t.0 == term).map_or(0.0, |t| t.2);
         if term == Term::Scale { self.gain.1.unwrap_or(0.0) } else { of_terms }
-    }
-
-    /// Rate, deg/s, and gain of every run at one rate, the bias of all runs taken out.
-    pub(super) fn gains(&self, fitted: &[SensorRun]) -> Vec<(f64, Estimate)> {
-        let bias = self.value(Term::Bias);
-        let gain = |run: &SensorRun| {
-            let stretch = Stretch::new(run, 0, &self.sensor, self.latency_s())?;
-            if tell_scale(std::slice::from_ref(&stretch)) {
-                return None;
-            }
-            let [scale] = found(&[stretch.without(&[Term::Bias], &[bias])], &[Term::Scale])?;
-            let last = run.len() - 1;
-            let rate = (run.reference_rad[last] - run.reference_rad[0]) / (run.t_s[last] - run.t_s[0]);
-            Some((rate.to_degrees(), scale.turned(self.sensor.gain)))
-        };
-        fitted.iter().filter_map(gain).collect()
     }
 
     /// Error of a run with its own bias, scale factor and lag taken out.

@@ -5,11 +5,11 @@ use cvg_model::effects::EffectId;
 use super::identify::{take_apart, thinned};
 use super::rate_deviations::T_PARTS;
 use super::rate_gyroscope::RateGyroscope;
+use super::rate_nonlinearity::Nonlinearity;
 use super::rate_regression::Term;
 use super::rate_runs;
 use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
-use crate::diagnostics::scale_factor::scale_factor;
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::numerics::statistics::root_mean_square;
@@ -32,6 +32,9 @@ pub(super) fn rate_finding(
     let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
         Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
     })?;
+    let thinned = thinned(runs);
+    let (model, by_nonlinearity) = beside_nonlinearity(model, stated, period, runs, &thinned);
+    let scale_factor = by_nonlinearity.as_ref().map(|n| n.found);
     let (gain, deviation) = model.gain;
     let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
@@ -50,9 +53,9 @@ pub(super) fn rate_finding(
             refined: true,
         });
     }
-    let thinned = thinned(runs);
+
     let samples = model.sensor.samples(&thinned, None);
-    let warnings = said_of(&model, runs, held)?;
+    let warnings = said_of(&model, runs, held, by_nonlinearity.as_ref())?;
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
@@ -66,10 +69,7 @@ pub(super) fn rate_finding(
         effects: rate_effects(&model),
         hypothesis,
         neutral_hypothesis,
-        scale_factor: model
-            .answered
-            .then(|| scale_factor(&model.gains(&thinned), model.deviation(Term::Bias).to_degrees()))
-            .flatten(),
+        scale_factor,
         bias: model.answered.then(|| model.of_all(Term::Bias)).filter(|_| !model.bias_varies),
         decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
         warnings,
@@ -88,8 +88,32 @@ pub(super) fn rate_finding(
     })
 }
 
-/// What has to be said of a rate gyroscope beside its numbers.
-fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Result<Vec<String>, Refusal> {
+/// The gyroscope with what its scale factor does with the rate, where the runs tell that: bias and lag are then those of runs
+/// from which it was taken out. Steps of the rate would show it as a lag.
+fn beside_nonlinearity(
+    model: RateGyroscope,
+    stated: Option<f64>,
+    period: f64,
+    runs: &[SensorRun],
+    thinned: &[SensorRun],
+) -> (RateGyroscope, Option<Nonlinearity>) {
+    let Some(first) = Nonlinearity::of_the_gains(&model, thinned) else { return (model, None) };
+    if !first.is_told() {
+        return (model, Some(first));
+    }
+    let linear: Vec<SensorRun> = runs.iter().map(|run| first.taken_out(run)).collect();
+    let Some(model) = RateGyroscope::identify(stated, period, &linear) else { return (model, Some(first)) };
+    let again = Nonlinearity::of_the_gains(&model, thinned);
+    (model, again)
+}
+
+/// What has to be said of a rate gyroscope beside its numbers, a scale factor that goes with the rate among them.
+fn said_of(
+    model: &RateGyroscope,
+    runs: &[SensorRun],
+    held: &[SensorRun],
+    by_nonlinearity: Option<&Nonlinearity>,
+) -> Result<Vec<String>, Refusal> {
     let mut warnings = Vec::new();
     if model.gain.1.is_none() {
         // of what hardly turns the bias is one all the same
@@ -128,7 +152,13 @@ fn said_of(model: &RateGyroscope, runs: &[SensorRun], held: &[SensorRun]) -> Res
         warnings.push(rate_runs::of_the_response(time_constant_s));
     }
     // a bias and a scale factor of the run's own change nothing in its course
-    let unexplained = |run| rate_runs::parting(run, &model.beside_its_own(run, model.without_a_name(run)));
+    let unexplained = |run| {
+        let mut left = model.without_a_name(run);
+        if let Some(nonlinearity) = by_nonlinearity {
+            left.iter_mut().zip(nonlinearity.of(run)).for_each(|(left, named)| *left -= named);
+        }
+        rate_runs::parting(run, &model.beside_its_own(run, left))
+    };
     warnings.extend(runs.iter().chain(held).filter_map(unexplained));
     Ok(warnings)
 }

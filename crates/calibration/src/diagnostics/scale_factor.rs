@@ -22,8 +22,8 @@ const BIAS_DPS: f64 = 0.004_2;
 const VAGUE: f64 = 10.0;
 /// Rates that differ by less than this share of the largest are one rate.
 const SAME_RATE: f64 = 0.02;
-/// Rates that have to be there.
-const FEWEST_RATES: usize = 3;
+/// Rates that have to be there: with as many as there are unknowns a run that is off by itself shows.
+const FEWEST_RATES: usize = 4;
 
 /// Blocks of the jackknife, and Student's 97.5 % point for one fewer degrees of freedom.
 const BLOCKS: usize = 10;
@@ -107,7 +107,7 @@ fn slope(segments: &[Residual]) -> Option<(f64, f64)> {
     (value.is_finite() && deviation.is_finite()).then_some((value, deviation))
 }
 
-/// Nonlinearity and asymmetry from rates and gains, where three rates or more and both senses are there.
+/// Nonlinearity and asymmetry from rates and gains, where four rates or more and both senses are there.
 /// `bias_dps` is what a bias common to all runs is believed to be, standard deviation, deg/s; no less than the Earth's rate.
 pub(crate) fn scale_factor(gains: &[(f64, Estimate)], bias_dps: f64) -> Option<ScaleFactor> {
     let told: Vec<(f64, Estimate)> =
@@ -140,7 +140,7 @@ pub(crate) fn scale_factor(gains: &[(f64, Estimate)], bias_dps: f64) -> Option<S
     Some(ScaleFactor { nonlinearity_ppm: estimate(1, range), asymmetry_ppm: estimate(2, 2.0) })
 }
 
-/// The slowest and the fastest rate, where there are three or more, in both senses, that are not one.
+/// The slowest and the fastest rate, where there are four or more, in both senses, that are not one.
 fn range_of_rates(rates: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let mut rates: Vec<f64> = rates.filter(|rate| rate.abs() > 0.0).collect();
     rates.sort_by(f64::total_cmp);
@@ -175,9 +175,9 @@ mod tests {
     }
 
     #[test]
-    fn three_rates_leave_a_bias_of_the_earths_rate_open() {
-        let runs: Vec<(f64, Estimate)> = [-300.0, 100.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
-        let s = scale_factor(&runs, 0.0).expect("three rates");
+    fn a_bias_of_the_earths_rate_stays_open_and_three_rates_tell_nothing() {
+        let runs: Vec<(f64, Estimate)> = [-300.0, -100.0, 100.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
+        let s = scale_factor(&runs, 0.0).expect("four rates");
         assert!(s.nonlinearity_ppm.value.abs() < 1e-6 && s.nonlinearity_ppm.half_width() > 20.0, "{s:?}");
         assert_eq!(scale_factor(&runs[1..], 0.0), None);
         let one_way: Vec<(f64, Estimate)> = [100.0, 300.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();

@@ -29,7 +29,20 @@ pub(crate) struct Prior {
     pub(crate) considered: bool,
 }
 
+/// Standard deviations of its prior beyond which the value of a parameter is not believed: one in 16,000 by chance.
+const BEYOND_BELIEF: f64 = 4.0;
+
 impl Prior {
+    /// Whether a fit moved a parameter of the drives further than is believed, as it does for want of an effect that is not in
+    /// the model: the drives multiply all that the commands do.
+    pub(crate) fn is_exceeded(&self, hypothesis: &Hypothesis) -> bool {
+        let off = (hypothesis.get(self.unknown) - self.mean).abs();
+        let of_the_drives = |member: usize| hypothesis.members[member].id.description().stage == Stage::Actuation;
+        !self.considered
+            && matches!(self.unknown, Unknown::Effect(member, _) if of_the_drives(member))
+            && off > BEYOND_BELIEF * self.deviation
+    }
+
     /// The deviation of `unknown`, if these priors hold it as a considered one.
     pub(super) fn considered_deviation(priors: &[Self], unknown: Unknown) -> Option<f64> {
         priors.iter().find(|p| p.considered && p.unknown == unknown).map(|p| p.deviation)

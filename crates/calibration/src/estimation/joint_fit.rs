@@ -523,7 +523,10 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             let (held, before) = (dataset.state(), dataset.excess());
             dataset.drive_is_free = true;
             let (freed, _) = dataset.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
-            explains = Some(dataset.excess() < DRIVES_SHARE * before);
+            // a ratio of the drives that nobody believes explains nothing
+            let believed =
+                !dataset.priors(&freed.hypothesis, drive.as_ref()).iter().any(|p| p.is_exceeded(&freed.hypothesis));
+            explains = Some(believed && dataset.excess() < DRIVES_SHARE * before);
             if explains == Some(true) {
                 (hypothesis, round) = (freed.hypothesis, ROUNDS);
                 continue;

@@ -73,6 +73,8 @@ impl Found {
         warnings.extend(self.drives.as_ref().map(|_| CLIPPED_DRIVES.to_owned()));
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);
+        warnings.extend(inference.said_of_the_unbelieved());
+        warnings.extend(inference.cubics_that_may_differ());
         let plots = with_plots.then(|| {
             let members = &fitted.fit.hypothesis.members;
             let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
@@ -124,6 +126,7 @@ impl Found {
         };
         report.warnings.extend(left_over(&report.heldout));
         self.allow_for_what_is_left(&mut report);
+        one_interval_a_number(&mut report);
         let mut calibration = self.calibration(&report, head.amplitude_v);
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
@@ -304,4 +307,18 @@ fn confounded(e: &EffectReport) -> String {
         e.confounded_with.join(", "),
         e.separated_by.as_deref().unwrap_or("another run")
     )
+}
+
+/// A ratio of gains that stands for itself and as the parameter of an effect has the same interval in both places.
+fn one_interval_a_number(report: &mut Report) {
+    let ratios = [
+        (EffectId::DetectionGainMismatch, report.detection_gain_ratio),
+        (EffectId::ActuationGainMismatch, report.actuation_gain_ratio),
+    ];
+    for (id, ratio) in ratios.into_iter().filter_map(|(id, ratio)| Some((id, ratio?))) {
+        let of = report.effects.iter_mut().filter(|e| e.id == id.description().id);
+        for parameter in of.filter_map(|e| e.parameters.first_mut()) {
+            parameter.ci95 = Some(ratio.ci95);
+        }
+    }
 }

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::estimation::actuation::{DriveGains, ring_down};
 use crate::estimation::coloured_noise::DRIFT_RAD_S;
+use crate::estimation::fit::Prior;
 use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
@@ -114,7 +115,7 @@ impl Inference<'_> {
 
     /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
     /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for. So
-    /// is what single runs contradict it with, and by how much the references of every run differ.
+    /// is what single runs contradict it with, by how much the references of every run differ, and what is beyond belief.
     pub(crate) fn angular_gain(&self, warnings: &mut Vec<String>) -> Estimate {
         let estimate = self.estimate(Unknown::AngularGain);
         let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
@@ -122,9 +123,58 @@ impl Inference<'_> {
         let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
         let slowed: f64 = causeless.map(|m| slowing(m, nominal)).sum();
         let open = slowed + self.dataset.screen.references_apart;
-        let estimate = estimate.widened(open * estimate.value.abs());
+        let estimate = estimate.widened(open * estimate.value.abs() + self.beyond_belief(Unknown::AngularGain));
         let estimate = covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings);
         self.turned_back_once(estimate, warnings)
+    }
+
+    /// The parameters that the fit moved beyond belief, each with the centre and the deviation of that.
+    fn unbelieved(&self) -> Vec<Prior> {
+        let mut priors = self.dataset.priors(self.hypothesis(), self.fitted.drive.as_ref());
+        priors.retain(|p| p.is_exceeded(self.hypothesis()));
+        priors
+    }
+
+    /// By how much an unknown would be another if what the fit moved beyond belief stood where it is believed to: what moved it
+    /// is not in the model, and moved the others with it.
+    fn beyond_belief(&self, unknown: Unknown) -> f64 {
+        let Some(at) = self.index(unknown) else { return 0.0 };
+        let with = |prior: &Prior| {
+            let i = self.index(prior.unknown)?;
+            let slope = self.covariance[(at, i)] / self.covariance[(i, i)].max(f64::MIN_POSITIVE);
+            Some((slope * (self.hypothesis().get(prior.unknown) - prior.mean)).abs())
+        };
+        self.unbelieved().iter().filter_map(with).sum()
+    }
+
+    /// Says what the fit moved beyond belief.
+    pub(crate) fn said_of_the_unbelieved(&self) -> impl Iterator<Item = String> {
+        self.unbelieved().into_iter().filter_map(|prior| {
+            let Unknown::Effect(member, parameter) = prior.unknown else { return None };
+            let of = self.hypothesis().members[member].id.description();
+            Some(format!(
+                "{} of {} came out as {:.3}, where {:.3} ± {:.3} is believed: what the model lacks moved it there; the intervals cover what the \
+                 angular gain and the detection gain ratio are without",
+                of.parameters[parameter].name,
+                of.id,
+                self.hypothesis().get(prior.unknown),
+                prior.mean,
+                1.96 * prior.deviation
+            ))
+        })
+    }
+
+    /// What has to be said of a gain ratio beside a cubic of the readout at one amplitude: the two channels are taken to have the
+    /// same cubic, and a difference δ of them reads as a ratio of 1 + ¾ δ a² there.
+    pub(crate) fn cubics_that_may_differ(&self) -> Option<String> {
+        let cubic = self.hypothesis().member(EffectId::DetectionCubic).filter(|m| !m.refined)?;
+        let ratio = self.first(EffectId::DetectionGainMismatch).filter(|_| self.dataset.alike().amplitude);
+        ratio.filter(|_| cubic.values[0] != 0.0).map(|_| {
+            "the detection gain ratio stands beside a cubic that is taken to be the same in both channels, and all runs are at one \
+             amplitude: a difference of the cubics would be part of the ratio, as it is at this amplitude; a run at another amplitude \
+             would separate them"
+                .into()
+        })
     }
 
     /// The angular gain with an interval that also covers what the runs that turn one way would tell of it if they did not
@@ -179,7 +229,8 @@ impl Inference<'_> {
             warnings.push("the campaign cannot tell the detection gain ratio".into());
         }
         let runs = self.dataset.tracks.iter().map(|t| t.track.file.as_str()).zip(own.iter().copied());
-        let identified = identified.map(|ratio| ratio.widened(self.held_by_harmonics()));
+        let unbelieved = self.first(EffectId::DetectionGainMismatch).map_or(0.0, |u| self.beyond_belief(u));
+        let identified = identified.map(|ratio| ratio.widened(self.held_by_harmonics() + unbelieved));
         let ratio = covering(identified?, "detection gain ratio", runs, CONTRADICTS, warnings);
         Some(self.borne_out(ratio, warnings))
     }
