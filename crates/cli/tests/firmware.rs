@@ -279,3 +279,35 @@ fn a_rate_gyroscope_is_told_its_two_numbers() {
         refused.stderr
     );
 }
+
+#[test]
+fn a_header_with_the_rails_of_one_channel_compiles_without_a_warning() {
+    if Command::new("cc").arg("--version").output().is_err() {
+        println!("skipped: there is no cc");
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut text = String::from("t_s,table_deg,xc_v,yc_v\n");
+    for row in recording(2500, 0.0).lines().skip(1) {
+        let (rest, y) = row.rsplit_once(',').unwrap();
+        let _ = writeln!(text, "{rest},{}", y.parse::<f64>().unwrap().clamp(-8000.0, 8000.0));
+    }
+    fs::write(at("clipped.csv"), text).unwrap();
+    cvg_ok(&[
+        "identify".as_ref(),
+        at("clipped.csv").as_os_str(),
+        "--sensor".as_ref(),
+        "--out".as_ref(),
+        at("r").as_os_str(),
+    ]);
+    let header = firmware(&at("r").join("calibration.toml"), &at("cvg_correction.h"), "64");
+    assert!(header.contains("y_read = y") && !header.contains("x_read = x"), "{header}");
+    fs::write(at("main.c"), PROGRAM).unwrap();
+    let built = Command::new("cc")
+        .args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "main.c", "-lm", "-o", "program"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+}

@@ -67,6 +67,8 @@ pub(crate) struct Selection<'a> {
     starts: Vec<Readout>,
     /// effects as text that compete
     texts: Vec<EffectId>,
+    /// directions of the sensor's period that rows stand in
+    stations: usize,
     /// what each readout makes of the rows when it is fitted without each fold
     without: BTreeMap<Option<Front>, Option<WithoutFolds>>,
 }
@@ -93,7 +95,8 @@ impl<'a> Selection<'a> {
             fit_runs.iter().map(|r| if stride > 1 { r.thinned(stride) } else { r.clone() }).collect();
         let folds = Folds::of(&runs, sensor.gain.abs() * sensor.cycles);
         let (starts, texts) = (starts.to_vec(), texts.to_vec());
-        Self { sensor, runs, folds, rails, starts, texts, without: BTreeMap::new() }
+        let stations = stations(sensor, &runs);
+        Self { sensor, runs, folds, rails, starts, texts, stations, without: BTreeMap::new() }
     }
 
     /// Chooses a model, and after it a simpler one where that is as good within a wider tolerance; none where there is not
@@ -245,7 +248,9 @@ impl<'a> Selection<'a> {
                 let of_texts = unknowns_of_texts(texts_of(front));
                 let of_readout = front.as_ref().map_or(0, |f| f.0.free().len()) + of_texts;
                 let size = of_readout + shape.size();
-                if !carries(rows, of_readout, shape.size() - constant, self.runs.len() + constant) {
+                if !stations_carry(self.stations, shape.order)
+                    || !carries(rows, of_readout, shape.size() - constant, self.runs.len() + constant)
+                {
                     return None;
                 }
                 let WithoutFolds { samples, of_radius } = self.without.get(front)?.as_ref()?;
@@ -313,6 +318,29 @@ impl<'a> Selection<'a> {
         let distinct = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
         (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
     }
+}
+
+/// Parts of a period that are directions of their own: far more than the harmonics of any table ask for, and fewer than rows of a turning
+/// sensor fill.
+const DIRECTIONS: usize = 1024;
+
+/// Directions of the period in which rows stand: of a sensor that turns as many as there are rows or parts, at stations as many as these
+/// are, however often each is recorded.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
+fn stations(sensor: &Sensor, runs: &[SensorRun]) -> usize {
+    let mut met = vec![false; DIRECTIONS];
+    for a in runs.iter().flat_map(|r| &r.reference_rad) {
+        // a station is in the middle of a part as a rule, and not on the edge of two
+        let part = (sensor.gain * sensor.cycles * a / std::f64::consts::TAU).rem_euclid(1.0) * DIRECTIONS as f64 + 0.5;
+        met[part as usize % DIRECTIONS] = true;
+    }
+    met.into_iter().filter(|met| *met).count()
+}
+
+/// Whether stations carry a table: a harmonic at or beyond half of them is zero at each, or one of the others, and rows that repeat a
+/// station say nothing more of it.
+fn stations_carry(stations: usize, order: usize) -> bool {
+    order == 0 || (2 * order + 1) * OBSERVATIONS_PER_UNKNOWN <= stations
 }
 
 /// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.

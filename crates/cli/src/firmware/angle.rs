@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::{AngleTable, Form as Written, Hypothesis};
 
-use super::{Form, POINTS, angle_table, closed, float, preamble, rows};
+use super::{Form, POINTS, angle_table, closed, float, periods, preamble, rows};
 
 /// Angles of a period at which the steps of an inverse are counted; and what a step less may be off by, rad: a tenth of what an
 /// angle of 360° has in single precision.
@@ -39,10 +39,9 @@ pub(super) fn text(calibration: &Calibration, left_out: &[String], form: Form, p
         call.to_owned(),
         String::new(),
         format!(
-            "theta_deg is the angle that the sensor gives, in degrees and of any turn; the answer is from 0 up to {:.0} degrees, {} \
-             periods a turn of the reference. Nothing is kept between calls.",
+            "theta_deg is the angle that the sensor gives, in degrees and of any turn; the answer is from 0 up to {:.0} degrees, {}. Nothing is kept between calls.",
             h.period_rad.to_degrees(),
-            h.angular_gain
+            periods(h)
         ),
     ];
     if form == Form::Rust && sin_cos {

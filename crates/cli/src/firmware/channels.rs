@@ -8,7 +8,7 @@ use cvg_calibration::{ChannelClip, Hypothesis, Member};
 use cvg_model::Envelope;
 use cvg_model::effects::{EffectId, Inverse, Moment, Values};
 
-use super::{Form, angle_table, closed, float, is_left_out, preamble, rows};
+use super::{Form, angle_table, closed, float, is_left_out, periods, preamble, rows};
 use crate::Failure;
 
 /// Halvings of the search for a radius.
@@ -121,9 +121,9 @@ fn header(calibration: &Calibration, steps: &[Step], left_out: &[String], points
         String::new(),
         "x and y are the readings of the two channels in the unit in which they were calibrated; the angle is the sensor's own,".into(),
         format!(
-            "from 0 up to {:.0} degrees, {} periods a turn of the reference. Nothing is kept between calls.",
+            "from 0 up to {:.0} degrees, {}. Nothing is kept between calls.",
             h.period_rad.to_degrees(),
-            h.angular_gain
+            periods(h)
         ),
     ];
     if let Some([low, high]) = calibration.provenance.amplitude_v {
@@ -166,8 +166,10 @@ static inline float cvg_root(float k)
 ";
 
 fn body(line: &mut dyn FnMut(&str), h: &Hypothesis, steps: &[Step], points: Option<usize>) {
-    if h.clip.is_some() {
-        line("    const float x_read = x, y_read = y;");
+    if let Some(clip) = h.clip {
+        for (name, _) in ["x", "y"].iter().zip(clip.rails_v).filter(|(_, rails)| rails.iter().any(|v| v.is_finite())) {
+            line(&format!("    const float {name}_read = {name};"));
+        }
     }
     for step in steps {
         match step {

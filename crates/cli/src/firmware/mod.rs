@@ -104,6 +104,12 @@ fn is_left_out(m: &Member) -> bool {
         && (id.description().stage != Stage::Readout || id.acts_on_angle() || id.in_time() || id.by_temperature())
 }
 
+/// How many periods the angle has.
+fn periods(h: &Hypothesis) -> String {
+    let count = h.angular_gain.abs();
+    format!("{count} {} a turn of the reference", if count == 1.0 { "period" } else { "periods" })
+}
+
 /// An effect by its name, with its values.
 fn with_values(m: &Member) -> String {
     let parameters = m.id.description().parameters.iter().zip(m.values);
@@ -121,6 +127,9 @@ fn preamble(calibration: &Calibration, needs: &str, how: &[String], left_out: &[
     lines.extend_from_slice(how);
     if !left_out.is_empty() {
         lines.push(format!("Not in it, since {told_by} not tell it: {}.", left_out.join(", ")));
+    }
+    if let Some(c) = calibration.hypothesis.reference_c.filter(|_| !left_out.is_empty()) {
+        lines.push(format!("What goes with the temperature is as at {c} degrees Celsius."));
     }
     for i in &calibration.provenance.inputs {
         lines.push(format!("From {}, CRC-32 {}.", one_line(&i.file), i.crc32.as_deref().unwrap_or("unknown")));
