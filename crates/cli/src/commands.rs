@@ -128,8 +128,9 @@ pub(crate) fn identify(
         output::answer(&told.summary)?;
     }
     let facts = serde_json::from_str(&told.json).map_err(Failure::input)?;
-    let outside = limits.map_or(Ok(None), |limits| limits.judge(&told.device, &facts))?;
-    told.reason.or(outside).map_or(Ok(()), |reason| Err(Failure::no_answer(reason)))
+    let judgement = limits.map(|limits| limits.judge(&told.device, &facts)).transpose()?.unwrap_or_default();
+    judgement.tell();
+    told.reason.or(judgement.outside).map_or(Ok(()), |reason| Err(Failure::no_answer(reason)))
 }
 
 /// An answer as it is handed out.

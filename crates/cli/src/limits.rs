@@ -14,6 +14,8 @@ use crate::{Failure, output, report_keys};
 
 /// What an element of a list is called by.
 const NAMES: [&str; 5] = ["id", "name", "file", "of", "channel"];
+/// What a limit says of a device that does not show the effect.
+const NOT_FOUND: &str = "not_found";
 const WANTED: &str =
     "a number of report.json with min, max or both, as in \"heldout.discovered.rms_deg\" = { max = 0.01 }";
 
@@ -27,12 +29,16 @@ struct Limit {
     path: String,
     min: Option<f64>,
     max: Option<f64>,
+    /// a device that does not show the effect passes
+    unless_found: bool,
 }
 
 /// What stands at a place of a report.
 enum Found {
     Number(f64),
     Null,
+    /// a parameter of an effect that the device does not show
+    NoEffect,
     Nothing,
 }
 
@@ -62,7 +68,7 @@ impl Limits {
         for (key, value) in table {
             let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
             let Some(inner) = value.as_table() else { return Err(format!("`{path}` is no table")) };
-            let ends = inner.iter().all(|(k, v)| (k == "min" || k == "max") && !v.is_table());
+            let ends = inner.iter().all(|(k, v)| ["min", "max", NOT_FOUND].contains(&k.as_str()) && !v.is_table());
             if !ends {
                 self.add(inner, &path)?;
                 continue;
@@ -77,13 +83,21 @@ impl Limits {
                 inner.get(key).map(as_number).transpose()
             };
             let (min, max) = (number("min")?, number("max")?);
+            let unless_found = match inner.get(NOT_FOUND).map(toml::Value::as_str) {
+                None => false,
+                Some(Some("pass")) => true,
+                Some(_) => return Err(format!("`{path}`: `{NOT_FOUND}` is not \"pass\"")),
+            };
+            if unless_found && !path.starts_with("effects.") {
+                return Err(format!("`{path}` is of no effect, and `{NOT_FOUND}` is for those"));
+            }
             if min.is_none() && max.is_none() {
                 return Err(format!("`{path}` has neither min nor max"));
             }
             if min.zip(max).is_some_and(|(min, max)| min > max) {
                 return Err(format!("`{path}`: min is above max"));
             }
-            self.0.push(Limit { path, min, max });
+            self.0.push(Limit { path, min, max, unless_found });
         }
         Ok(())
     }
@@ -97,16 +111,14 @@ impl Limits {
         unknown.map_or(Ok(()), |path| Err(unnamed(&path, written)))
     }
 
-    /// Judges a report, a line each on standard error; why it fails, where it does.
+    /// Judges a report.
     ///
     /// # Errors
     /// Bad use where a limit names no number of the report.
-    pub(crate) fn judge(&self, device: &str, report: &Value) -> Result<Option<String>, Failure> {
+    pub(crate) fn judge(&self, device: &str, report: &Value) -> Result<Judgement, Failure> {
         let verdicts = self.verdicts(report)?;
-        for verdict in &verdicts {
-            output::tell(format_args!("{}", verdict.line(device)));
-        }
-        Ok(outside(device, &verdicts))
+        let lines = verdicts.iter().map(|verdict| verdict.line(device)).collect();
+        Ok(Judgement { lines, outside: outside(device, &verdicts) })
     }
 
     /// Holds a report against each limit.
@@ -115,13 +127,15 @@ impl Limits {
     /// Bad use where a limit names no number of the report.
     pub(crate) fn verdicts(&self, report: &Value) -> Result<Vec<Verdict>, Failure> {
         let held = |limit: &Limit| {
-            let Limit { path, min, max } = limit.clone();
-            let value = match find(report, &dotted(&path)) {
-                Found::Number(value) => Some(value),
-                Found::Null => None,
+            let Limit { path, min, max, unless_found } = limit.clone();
+            let found = find(report, &dotted(&path));
+            let (passes, value, shown) = match found {
+                Found::Number(value) => (limit.holds(value), Some(value), value.to_string()),
+                Found::Null => (false, None, "not identifiable".into()),
+                Found::NoEffect => (unless_found, None, "not found".into()),
                 Found::Nothing => return Err(unnamed(&path, &[])),
             };
-            Ok(Verdict { passes: value.is_some_and(|value| limit.holds(value)), path, value, min, max })
+            Ok(Verdict { path, value, shown, min, max, passes })
         };
         self.0.iter().map(held).collect()
     }
@@ -144,13 +158,38 @@ impl Limit {
     }
 }
 
+/// What the limits say of a device.
+#[derive(Debug, Default)]
+pub(crate) struct Judgement {
+    /// a line for each limit
+    lines: Vec<String>,
+    /// why it fails, where it does
+    pub(crate) outside: Option<String>,
+}
+
+impl Judgement {
+    /// A device of which there is no number to judge.
+    pub(crate) fn failed(why: &str) -> Self {
+        Self { lines: Vec::new(), outside: Some(why.to_owned()) }
+    }
+
+    /// Says each verdict on standard error.
+    pub(crate) fn tell(&self) {
+        for line in &self.lines {
+            output::tell(format_args!("{line}"));
+        }
+    }
+}
+
 /// A number of a report, held against its limit.
 #[derive(Debug, Clone)]
 pub struct Verdict {
     /// its place in report.json, as the limit names it
     pub path: String,
-    /// none where the report does not tell it, which does not pass
+    /// none where the report does not tell it
     pub value: Option<f64>,
+    /// the number, or why there is none
+    pub shown: String,
     /// the least that passes
     pub min: Option<f64>,
     /// the most that passes
@@ -164,10 +203,9 @@ impl Verdict {
     #[must_use]
     pub fn line(&self, device: &str) -> String {
         let word = if self.passes { "pass" } else { "FAIL" };
-        let value = self.value.map_or("not identifiable".to_owned(), |value| value.to_string());
         let end = |word: &str, v: Option<f64>| v.map(|v| format!("{word} {v}"));
         let ends = [end("min", self.min), end("max", self.max)].into_iter().flatten().collect::<Vec<_>>().join(", ");
-        format!("{word}  {device}  {} = {value}  ({ends})", self.path)
+        format!("{word}  {device}  {} = {}  ({ends})", self.path, self.shown)
     }
 }
 
@@ -201,7 +239,7 @@ fn find(value: &Value, path: &str) -> Found {
     let effects = |v: &Value| v.as_array().is_some_and(|v| v.iter().all(|e| e.get("evidence").is_some()));
     let id = path.split('.').next().unwrap_or_default();
     if effects(value) && EffectId::from_id(id).is_some() && step(value, id).is_none() {
-        Found::Null
+        Found::NoEffect
     } else {
         Found::Nothing
     }

@@ -46,6 +46,14 @@ fn limits_are_judged_a_line_each_and_one_that_fails_is_told_by_the_exit_code() {
     let null = judged("\"allan.bias_instability_dph.value\" = { max = 1.0 }\n");
     assert_eq!(null.status, 1, "what is not identifiable does not pass");
     assert!(null.stderr.contains("not identifiable"), "{}", null.stderr);
+    // an effect that the device does not show
+    let of_cubic =
+        |more: &str| judged(&format!("\"effects.detection-cubic.parameters.kappa.value\" = {{ max = 0.01{more} }}\n"));
+    for (more, status, word) in [("", 1, "FAIL"), (", not_found = \"pass\"", 0, "pass")] {
+        let absent = of_cubic(more);
+        assert_eq!(absent.status, status, "{}", absent.stderr);
+        assert!(absent.stderr.contains(word) && absent.stderr.contains("= not found"), "{}", absent.stderr);
+    }
     for nothing in ["\"heldout.discovered.rms\" = { max = 1 }\n", "\"device\" = { max = 1 }\n"] {
         let outcome = judged(nothing);
         assert_eq!(outcome.status, 2, "{nothing}: {}", outcome.stderr);
@@ -103,6 +111,8 @@ fn limits_that_cannot_be_meant_are_refused_before_anything_is_identified() {
         ("\"angular_gain.value\" = 0.78\n", "is no table"),
         ("\"angular_gain.value\" = { max = \"1\" }\n", "`max` is no number"),
         ("\"angular_gain.value\" = {}\n", "neither min nor max"),
+        ("\"angular_gain.value\" = { max = 1, not_found = \"pass\" }\n", "is of no effect"),
+        ("\"effects.detection-cubic.parameters.kappa.value\" = { max = 1, not_found = 1 }\n", "is not \"pass\""),
         ("", "there is no limit"),
         ("=\n", "limits.toml"),
     ] {

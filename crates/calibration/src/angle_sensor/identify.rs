@@ -19,6 +19,7 @@ use super::sensor_alone::alone;
 use super::table_fit::Sample;
 use super::thermal::{Thermal, Told};
 use super::units::{of_the_angle, of_the_reference, require_degrees};
+use super::whole_periods::in_any_order;
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
@@ -78,6 +79,8 @@ pub(crate) fn identify(
     };
     let sense = campaign.angular_gain.map(f64::signum);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
+    let scattered = if stated.is_none() && !rate_gyroscope { in_any_order(&campaign.runs, period) } else { None };
+    let stated = stated.or(scattered);
     let reference_c = campaign.temperature_c;
     let rates_alone = campaign.runs.iter().all(|run| run.recording.table_deg.is_none());
     // runs are known by their number among those about the input axis
@@ -88,8 +91,13 @@ pub(crate) fn identify(
     let mut left_out = Vec::new();
     if rate_gyroscope {
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
-    } else {
+    } else if scattered.is_none() {
         campaign.runs.iter().try_for_each(|run| require_degrees(run, period))?;
+    }
+    if let Some(periods) = scattered.filter(|periods| *periods > 1.0) {
+        left_out.push(format!(
+            "the rows stand in no order: of whole numbers of periods a turn {periods:.0} alone fits, and was taken; pole_pairs in campaign.toml states it"
+        ));
     }
     let mut runs = prepare(campaign, &mut left_out)?;
     runs = if rate_gyroscope {

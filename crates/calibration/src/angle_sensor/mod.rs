@@ -35,5 +35,6 @@ mod sensor_alone;
 mod table_fit;
 mod thermal;
 mod units;
+mod whole_periods;
 
 pub(crate) use identify::{identify, is_rate_gyroscope, serves};

@@ -22,9 +22,11 @@ const BY_CHANCE: f64 = 2.0;
 /// Samples whose circular mean begins the unwrapping of an error.
 const BEGINNING: usize = 50;
 
-/// Rows so many periods apart may have gone the other way between them; other gains are tried up to so many periods between
-/// rows, and fit alike where they leave up to so many times as much.
+/// Rows so many periods apart may have gone the other way between them; of a sensor with several periods a turn, of which others have
+/// ten times as many, rows so many apart may have turned by one more (at even steps the next gain is 1/step − 1 times this one).
+/// Other gains are tried up to so many periods between rows, and fit alike where they leave up to so many times as much.
 const COARSE: f64 = 0.25;
+const COARSE_OF_SEVERAL: f64 = 1.0 / 11.0;
 const ALIASES: i32 = 3;
 const ALIKE: f64 = 1.5;
 /// The unit of a rate that makes a whole number of whole periods.
@@ -82,7 +84,8 @@ impl Sensor {
     /// far apart that they do not show which way the angle went between them.
     fn aliases(&self, runs: &[SensorRun]) -> Vec<f64> {
         let step = coarsest_step(runs);
-        if step * self.gain.abs() < COARSE * self.period {
+        let coarse = if self.gain.abs() < 1.5 { COARSE } else { COARSE_OF_SEVERAL };
+        if step * self.gain.abs() < coarse * self.period {
             return Vec::new();
         }
         let most = ALIKE * self.misfit(runs, self.gain);
@@ -143,8 +146,13 @@ impl Sensor {
         self.cycles * self.gain.abs()
     }
 
+    /// A sensor of this gain, taken as exact.
+    pub(super) fn of_gain(gain: f64, period: f64) -> Self {
+        Self { gain, free_gain: false, period, cycles: TAU / period }
+    }
+
     /// How badly a signed gain fits, for telling the sense.
-    fn misfit(&self, runs: &[SensorRun], gain: f64) -> f64 {
+    pub(super) fn misfit(&self, runs: &[SensorRun], gain: f64) -> f64 {
         runs.iter()
             .map(|r| match &r.reading {
                 Reading::Angle(theta) => {
@@ -298,6 +306,22 @@ mod tests {
             recorded: None,
             reading: Reading::Angle(theta),
         }]
+    }
+
+    #[test]
+    fn four_periods_at_even_steps_may_be_sixty_four_and_one_is_one() {
+        let said = |gain: f64, step_deg: f64| {
+            let mut runs = stations(gain);
+            let run = &mut runs[0];
+            run.reference_rad = (0..40).map(|i| (f64::from(i) * step_deg).to_radians()).collect();
+            run.reading = Reading::Angle(run.reference_rad.iter().map(|a| gain * a).collect());
+            Sensor::new(None, TAU, &runs).and_then(|s| s.doubts(false, &runs)).expect("a whole number")
+        };
+        // 64 periods at 18° a row: 72° of the angle from row to row, and so are 4 the other way
+        let aliased = said(64.0, 18.0).expect("a doubt");
+        assert!(aliased.contains("4 periods a turn and 16.00 look alike"), "{aliased}");
+        assert_eq!(said(4.0, 2.0), None);
+        assert_eq!(said(1.0, 18.0), None);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub(crate) struct Row<'a> {
     pub(crate) index: usize,
     /// input angle since the start of the segment, rad
     pub(crate) turned: f64,
-    /// nominal precession rate, rad/s
+    /// nominal precession rate, rad/s, the mean over the latency of the output
     pub(crate) precession: f64,
     /// the vibration
     pub(crate) vibration: Envelope<f64>,
@@ -94,8 +94,10 @@ pub(crate) fn propagate(
     let sense = hypothesis.sense();
     let moment = if hypothesis.reads_commands() { Track::moment } else { Track::instant };
     let zero_input = track.input_rad[segment.range.start];
+    let latency_s = hypothesis.latency_s();
     for i in segment.range.clone().step_by(stepping.stride) {
-        let at = moment(track, i, hypothesis.precession(track.rate(i)));
+        // a late output turned meanwhile at the mean rate since, which is not that of the sample where the rate changes
+        let at = moment(track, i, hypothesis.precession(track.mean_rate_before(i, latency_s)));
         predictor.predict(track.envelope(i), track.commands(i, stepping.stride), &at, &mut vibration);
         excess.extend_to(track, i);
         let turned = track.input_rad[i] - zero_input;

@@ -13,7 +13,7 @@ use super::lake::{self, Member};
 use super::{PRIOR, SUMMARIES, kept};
 use crate::commands::{RESULTS, Told};
 use crate::input::{Wanted, campaign, explained, files};
-use crate::limits::Limits;
+use crate::limits::{Judgement, Limits};
 use crate::population::Device;
 use crate::{Failure, output};
 
@@ -84,7 +84,7 @@ pub(super) fn answered(sources: Vec<Source>, out: &Path, limits: Option<&Limits>
         let opened = campaign(std::slice::from_ref(&path), &wanted);
         device(opened, None, Place { folder: folder.clone(), name: folder, path, out }, limits)
     };
-    let mut all: Vec<Device> = files.into_par_iter().map(of_file).collect::<Result<_, _>>()?;
+    let mut all = in_order(files.into_par_iter().map(of_file).collect::<Result<_, _>>()?);
     for lake in &lakes {
         lake::each(lake, |members| {
             let placed: Vec<(String, Member)> = members.into_iter().map(|m| (folders.of_name(&m.name), m)).collect();
@@ -93,11 +93,17 @@ pub(super) fn answered(sources: Vec<Source>, out: &Path, limits: Option<&Limits>
                 let place = Place { folder, name, path: lake.path().to_path_buf(), out };
                 device(member.campaign(), Some(&rows), place, limits)
             };
-            all.extend(placed.into_par_iter().map(of_member).collect::<Result<Vec<_>, _>>()?);
+            all.extend(in_order(placed.into_par_iter().map(of_member).collect::<Result<_, _>>()?));
             Ok(())
         })?;
     }
     Ok(all)
+}
+
+/// The devices, after their verdicts were said in their order and not in that of the threads.
+fn in_order(judged: Vec<(Device, Judgement)>) -> Vec<Device> {
+    judged.iter().for_each(|(_, judgement)| judgement.tell());
+    judged.into_iter().map(|(device, _)| device).collect()
 }
 
 /// Bytes of a folder's name: systems take 255, of which what is unfinished has some before it.
@@ -150,7 +156,7 @@ fn device(
     rows: Option<&Value>,
     place: Place<'_>,
     limits: Option<&Limits>,
-) -> Result<Device, Failure> {
+) -> Result<(Device, Judgement), Failure> {
     let own = place.out.join(&place.folder);
     let report = match opened {
         Ok(opened) => match kept::answer(&own, &opened, rows) {
@@ -164,12 +170,12 @@ fn device(
         }
     };
     let name = report["device"].as_str().unwrap_or_default().to_owned();
-    let outside = match limits {
-        Some(_) if report["schema"].is_null() => Some("it cannot be read".into()),
+    let judgement = match limits {
+        Some(_) if report["schema"].is_null() => Judgement::failed("it cannot be read"),
         Some(limits) => limits.judge(&name, &report)?,
-        None => None,
+        None => Judgement::default(),
     };
-    Ok(Device::new(place.folder, place.path, report, outside))
+    Ok((Device::new(place.folder, place.path, report, judgement.outside.clone()), judgement))
 }
 
 /// Identifies a campaign, and writes what `cvg identify` writes of it but for the page.
