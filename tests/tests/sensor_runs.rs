@@ -1,5 +1,5 @@
-//! Two-channel sensors on a shaft: an eccentric shaft beside offsets, readouts that go with the temperature, and one run of several
-//! that is not like the others.
+//! Two-channel sensors on a shaft: an eccentric shaft beside offsets, readouts that go with the temperature, rows that are damaged, and
+//! one run of several that is not like the others.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::{Campaign, Recording, Role, Run};
@@ -135,6 +135,78 @@ fn a_readout_that_goes_with_the_temperature_of_the_runs_is_undone() {
         "{:?}",
         two.report.warnings
     );
+}
+
+#[test]
+fn a_readout_that_goes_with_the_temperature_is_undone_where_the_sensor_swings_within_a_turn() {
+    let built = Built { per_k: [2e-4, 3e-4], ..BUILT };
+    let warming = |t: f64| 25.0 + 20.0 * (1.0 - (-t / 7.0).exp());
+    for (seed, swing_deg) in [(1, 100.0), (2, 150.0), (3, 250.0)] {
+        let swings = |t: f64| swing_deg * (4.0 * t).sin();
+        let i = of_runs(vec![run("swing.csv", Role::Fit, read(built, swings, Some(warming), 1.0, seed))]);
+        let told = [("temperature", 0, 3e-4), ("offset-temperature", 0, 2e-4), ("detection-gain-mismatch", 0, 1.02)];
+        assert!(
+            told.iter().all(|(id, at, planted)| holds(&i, id, *at, *planted)),
+            "{swing_deg}°: {:#?}",
+            i.report.effects
+        );
+        let motion = ["angle-latency", "acceleration-lag"].map(|id| find(&i, id).is_some());
+        assert_eq!(motion, [false, false], "{swing_deg}°: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 0.026, "{swing_deg}°: {}° of 0.023° noise", held_out(&i));
+    }
+}
+
+/// In a harmonic swing within a turn the acceleration is a function of the position, and what repeats with that is its table's.
+#[test]
+fn a_table_is_not_taken_for_a_lag_behind_the_acceleration_where_a_swing_is_harmonic() {
+    let swings = |t: f64| 120.0 * (4.0 * t).sin();
+    for seed in 0..3 {
+        let mut recording = read(
+            BUILT,
+            |t| {
+                let a = swings(t);
+                a + 0.5 * (3.0 * a).to_radians().sin()
+            },
+            None,
+            1.0,
+            seed,
+        );
+        recording.table_deg = Some(recording.t_s.iter().map(|t| swings(*t)).collect());
+        let i = of_runs(vec![run("swing.csv", Role::Fit, recording)]);
+        assert!(find(&i, "acceleration-lag").is_none(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 0.026, "seed {seed}: {}° of 0.023° noise", held_out(&i));
+    }
+}
+
+#[test]
+fn a_sensor_that_is_late_is_compensated_without_a_reference_by_the_rate_of_its_own_angle() {
+    let late = |seed| {
+        let mut recording = read(BUILT, |t| there_and_back(t - 0.01), None, -1.0, seed);
+        recording.table_deg = Some(recording.t_s.iter().map(|t| there_and_back(*t)).collect());
+        recording
+    };
+    let i = of_runs(vec![run("late.csv", Role::Fit, late(1))]);
+    assert!(holds(&i, "angle-latency", 0, 0.01), "{:#?}", i.report.effects);
+    let other = late(2);
+    let truth: Vec<f64> = other.table_deg.iter().flatten().map(|a| -a).collect();
+    let undone = compensate(&i.calibration, &Recording { table_deg: None, ..other }).unwrap().theta_deg.unwrap();
+    let off: Vec<f64> = undone.iter().zip(&truth).map(|(a, b)| a - b).collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    let rms = (off.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt();
+    // the rate makes up to 2° of 0.01 s
+    assert!(rms < 0.026, "{rms}° of 0.023° noise");
+}
+
+#[test]
+fn rows_that_a_spark_hit_move_neither_the_readout_nor_its_interval() {
+    for (seed, size) in [(1, 1.0), (2, -0.3)] {
+        let mut hit = recorded(BUILT, 37.0, 1.0, seed);
+        hit.yc_v.iter_mut().for_each(|y| y.iter_mut().skip(40).step_by(97).for_each(|y| *y += size));
+        let i = of_runs(vec![run("hit.csv", Role::Fit, hit)]);
+        let ratio = i.report.detection_gain_ratio.unwrap();
+        assert!(holds(&i, "detection-gain-mismatch", 0, 1.02) && ratio.half_width() < 2e-4, "{size}: {ratio:?}");
+        assert!(i.report.warnings.iter().any(|w| w.contains("off the ellipse that the others draw")), "{size}");
+    }
 }
 
 #[test]

@@ -145,14 +145,13 @@ impl Described<'_> {
         let (side, d) = (&self.model.table.side, &self.deviations.side);
         let gain = self.model.sensor.gain;
         let lag = || {
+            if side[0] == 0.0 {
+                return None;
+            }
             let p = vec![parameter("latency", "s", -side[0] / gain, d[0] / gain.abs())];
             let signature = EffectId::AngleLatency.description().signature;
-            effect(
-                library_id(EffectId::AngleLatency),
-                Origin::Discovered,
-                p,
-                format!("{signature}; {}", self.evidence()),
-            )
+            let evidence = format!("{signature}; {}", self.evidence());
+            Some(effect(library_id(EffectId::AngleLatency), Origin::Discovered, p, evidence))
         };
         match self.model.table.shape.motion {
             Motion::None => Vec::new(),
@@ -165,11 +164,11 @@ impl Described<'_> {
                 let evidence = format!("a constant that changes sign with the direction; {}", self.evidence());
                 vec![effect(library_id(EffectId::HarmonicN), Origin::Empirical, p, evidence)]
             }
-            Motion::Rate => vec![lag()],
+            Motion::Rate => lag().into_iter().collect(),
             Motion::RateAndAcceleration => {
                 let p = vec![parameter("acceleration_lag", "s^2", -side[1] / gain, d[1] / gain.abs())];
                 let evidence = format!("angle ∝ acceleration, as of a type-II tracking loop; {}", self.evidence());
-                vec![lag(), effect("acceleration-lag", Origin::Empirical, p, evidence)]
+                lag().into_iter().chain([effect("acceleration-lag", Origin::Empirical, p, evidence)]).collect()
             }
         }
     }

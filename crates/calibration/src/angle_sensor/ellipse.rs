@@ -9,7 +9,12 @@ use crate::numerics::linear::NormalEquations;
 
 /// The algebraic ellipse through the points of all runs: a x² + b xy + c y² + d x + e y = 1 by least squares.
 pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {
-    let points = || runs.iter().filter_map(SensorRun::channels).flatten();
+    through(runs.iter().filter_map(SensorRun::channels).flatten())
+}
+
+/// … and through these points.
+pub(super) fn through<'a>(points: impl Iterator<Item = &'a [f64; 2]> + Clone) -> Option<Readout> {
+    let points = || points.clone();
     let count = points().count() as f64;
     if count < 6.0 {
         return None;

@@ -4,7 +4,7 @@
 use super::circle;
 use super::cross_axis;
 use super::deviations::{Deviations, deviations, own_gain_ratios};
-use super::effects::Described;
+use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel};
 use super::odd_runs::without_odd_runs;
@@ -286,7 +286,10 @@ fn sensor_finding(
     texts: Vec<EffectId>,
 ) -> Result<Finding<'static>, Refusal> {
     let Asked { stated, sense, period, rates_alone } = asked;
-    let (model, deviations) = identified(asked, model, runs, texts)?;
+    let (model, mut deviations) = identified(asked, model, runs, texts)?;
+    if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
+        thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
+    }
     require_following(runs, model.sensor.gain)?;
     let thinned = thinned(runs);
     let described = Described { model: &model, deviations: &deviations };

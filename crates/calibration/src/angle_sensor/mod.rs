@@ -32,6 +32,7 @@ mod screening;
 mod selection;
 mod sensor;
 mod sensor_alone;
+mod spikes;
 mod table_fit;
 mod thermal;
 mod units;

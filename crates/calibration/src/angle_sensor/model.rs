@@ -87,19 +87,28 @@ impl SensorModel {
         answered.or(models.first()).cloned().ok_or_else(refusal)
     }
 
-    /// Takes out that the angle follows motion, where no number of it is further from nothing than its interval. What is left
-    /// then may be the sensor as it is.
+    /// Takes out of how the angle follows motion what is no further from nothing than its interval. What is left then may be the
+    /// sensor as it is.
     pub(crate) fn without_motion_by_chance(&mut self, deviations: &mut Deviations) {
-        let of_motion = ..self.table.shape.motion.size();
-        let mut shown = self.table.side[of_motion].iter().zip(&deviations.side[of_motion]);
-        if of_motion.end == 0 || shown.any(|(value, deviation)| value.abs() > STUDENT_19 * deviation) {
-            return;
-        }
-        self.table.side.drain(of_motion);
-        deviations.side.drain(of_motion);
-        self.table.shape.motion = Motion::None;
-        if self.table.shape.size() == 0 && self.front().is_none_or(|front| front.kind == Kind::Plain) {
-            self.outcome = Outcome::Neutral;
+        let motion = self.table.shape.motion;
+        let is_shown = |at: usize| self.table.side[at].abs() > STUDENT_19 * deviations.side[at];
+        let shown: Vec<bool> = (0..motion.size()).map(is_shown).collect();
+        match (motion, shown.as_slice()) {
+            (Motion::RateAndAcceleration, [true, false]) => {
+                self.table.side.remove(1);
+                deviations.side.remove(1);
+                self.table.shape.motion = Motion::Rate;
+            }
+            (Motion::RateAndAcceleration, [false, true]) => self.table.side[0] = 0.0,
+            (_, shown) if !shown.is_empty() && !shown.contains(&true) => {
+                self.table.side.drain(..motion.size());
+                deviations.side.drain(..motion.size());
+                self.table.shape.motion = Motion::None;
+                if self.table.shape.size() == 0 && self.front().is_none_or(|front| front.kind == Kind::Plain) {
+                    self.outcome = Outcome::Neutral;
+                }
+            }
+            _ => {}
         }
     }
 

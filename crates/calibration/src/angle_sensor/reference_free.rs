@@ -14,6 +14,7 @@ use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, fit};
 use super::samples::{SensorRun, apart};
+use super::spikes::without_spikes;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member};
@@ -76,7 +77,8 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
     let mut warnings = Vec::new();
-    let (fitted, held) = apart(of_one_sensor(runs.collect::<Result<_, _>>()?, &mut warnings)?)?;
+    let runs = without_spikes(runs.collect::<Result<_, _>>()?, &mut warnings);
+    let (fitted, held) = apart(of_one_sensor(runs, &mut warnings)?)?;
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
         return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));

@@ -153,6 +153,11 @@ impl SensorRun {
         span(&self.reference_rad)
     }
 
+    /// How far it turns there and back, rad.
+    pub(crate) fn path_rad(&self) -> f64 {
+        self.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs()).sum()
+    }
+
     /// The channels, where it has them.
     pub(crate) fn channels(&self) -> Option<&[[f64; 2]]> {
         match &self.reading {

@@ -5,6 +5,7 @@ use super::agreement::of_one_sensor;
 use super::ellipse;
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
+use super::spikes::without_spikes;
 use crate::data::copies::{copied_rows, said};
 use crate::data::interpolated::{self, interpolated_rows};
 use crate::data::plausibility::MOST_LOST;
@@ -46,6 +47,7 @@ pub(crate) fn believed(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<SensorRun>, Refusal> {
     let runs = without_interpolated_rows(without_copied_rows(runs, warnings)?, warnings);
+    let runs = without_spikes(runs, warnings);
     let runs = of_one_sensor(runs, warnings)?;
     let follows: Vec<Follows> = runs.iter().map(|r| follows(r, stated, period)).collect();
     let mut told: Vec<f64> =

@@ -19,6 +19,7 @@ use super::samples::{Reading, SensorRun};
 use super::sensor::Sensor;
 use super::table_fit::{Motion, Sample, Shape, TableFit};
 use crate::model::angle_table::Form;
+use crate::numerics::linear::NormalEquations;
 
 /// Lengths of the table that are offered: nested, so that the order of trial has no say.
 pub(crate) const ORDERS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32];
@@ -41,6 +42,8 @@ const FINALISTS: usize = 3;
 const MOST_LINES: usize = 6;
 /// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
 pub(crate) const VARYING_RATE: f64 = 0.02;
+/// A motion of which less than this share, in power, is no function of the position is not told from it.
+const LEAST_OF_ITS_OWN: f64 = 1e-2;
 
 /// A readout as it is fitted: what the library has of it, how angle and radius count, and which effects as text are there.
 pub(crate) type Front = (Kind, Weighting, Vec<EffectId>);
@@ -213,12 +216,39 @@ impl<'a> Selection<'a> {
         if both {
             all.push(Motion::Direction);
         }
-        all.extend([Motion::Rate, Motion::RateAndAcceleration]);
+        all.push(Motion::Rate);
+        if self.is_told_from_position(|s| s.acceleration) {
+            all.push(Motion::RateAndAcceleration);
+        }
         let trial = self.offer(std::slice::from_ref(front), &self.shapes(&MOTION_ORDERS, &all, &[]));
         match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
             Some(motion) => vec![Motion::None, motion],
         }
+    }
+
+    /// Whether a motion is more than a function of the position: an acceleration is none where a swing is harmonic and stays within
+    /// a turn.
+    fn is_told_from_position(&self, motion: impl Fn(&Sample) -> f64) -> bool {
+        let samples = self.sensor.samples(&self.runs, None);
+        let constants = self.runs.len();
+        let row = |s: &Sample| {
+            let mut row = vec![0.0; constants + 2 * MOTION_ORDERS[0] + 1];
+            row[s.run] = 1.0;
+            let angle = self.sensor.cycles * self.sensor.gain * s.reference;
+            for n in 1..=MOTION_ORDERS[0] {
+                let (sin, cos) = (n as f64 * angle).sin_cos();
+                (row[constants + 2 * n - 2], row[constants + 2 * n - 1]) = (cos, sin);
+            }
+            row[constants + 2 * MOTION_ORDERS[0]] = if self.sensor.free_gain { s.reference } else { 0.0 };
+            row
+        };
+        let mut equations = NormalEquations::new(constants + 2 * MOTION_ORDERS[0] + 1);
+        samples.iter().for_each(|s| equations.add(&row(s), motion(s)));
+        let x = equations.solve();
+        let left = |s: &Sample| motion(s) - row(s).iter().zip(&x).map(|(a, b)| a * b).sum::<f64>();
+        let power = |of: &dyn Fn(&Sample) -> f64| samples.iter().map(|s| of(s).powi(2)).sum::<f64>();
+        power(&left) > LEAST_OF_ITS_OWN * power(&motion)
     }
 
     fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {

@@ -10,7 +10,7 @@
 use cvg_model::effects::EffectId;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::deviations::{jackknife, without_block};
+use super::deviations::{Deviations, jackknife, without_block};
 use super::effects::LibraryReadout;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
@@ -30,7 +30,7 @@ use crate::report::{EffectReport, Estimate, ParameterReport};
 const BY_CHANCE: f64 = 5e-4;
 /// Runs go through the temperatures where the widest span of one is this share of that of all: engineering choice.
 const WITHIN: f64 = 0.5;
-/// Periods that a run has to turn through, there and back as well.
+/// Periods that a run has to turn through, there and back as well: one swing does not tell a position from a temperature.
 const FEWEST_PERIODS: f64 = 2.0;
 /// Rounds of the regression, which is linear but for what a round moves.
 const ROUNDS: usize = 4;
@@ -100,7 +100,7 @@ impl Thermal {
         let Ok(sensor) = Sensor::new(stated, period, runs) else { return Told::Nothing };
         let widest = temperatures.iter().map(|t| span(t)).fold(0.0, f64::max);
         let turns =
-            runs.iter().all(|r| r.travel_rad() * sensor.cycles_per_turn() > FEWEST_PERIODS * std::f64::consts::TAU);
+            runs.iter().all(|r| r.path_rad() * sensor.cycles_per_turn() > FEWEST_PERIODS * std::f64::consts::TAU);
         let Some(bench) = Bench::new(&sensor, runs, reference_c).filter(|_| turns) else { return Told::Nothing };
         if widest >= LEAST_SPAN_K.max(WITHIN * span(&all)) {
             bench.within().map_or(Told::Nothing, Told::Slopes)
@@ -131,6 +131,17 @@ impl Thermal {
 
     pub(super) fn reference_c(&self) -> f64 {
         self.reference_c
+    }
+
+    /// Adds to the deviations of offsets and gain ratio what the slopes leave open between the temperatures of the runs and that which
+    /// parameters refer to.
+    pub(super) fn widen(&self, deviations: &mut Deviations, gain_ratio: f64, runs: &[SensorRun]) {
+        let temperatures = || runs.iter().flat_map(|r| r.temp_c.iter().flatten());
+        let warmer = temperatures().sum::<f64>() / temperatures().count().max(1) as f64 - self.reference_c;
+        let [x, y, gain] = self.half_widths.map(|half| half / STUDENT_19 * warmer);
+        for (own, open) in deviations.readout.iter_mut().zip([x, y, gain * gain_ratio]) {
+            *own = own.hypot(open);
+        }
     }
 
     /// What has to be said of it.

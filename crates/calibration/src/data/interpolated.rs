@@ -4,7 +4,7 @@
 //! $s = c^2/8a$, with the amplitude $a$. Neither noise nor the shape of the readout takes that to nothing in row after row;
 //! linear interpolation does. Between the rows that were recorded the angle may have turned any number of times.
 
-use crate::data::plausibility::{Findings, leave_out as leave_out_rows, places, repeats};
+use crate::data::plausibility::{Findings, leave_out as leave_out_rows, places, stretches};
 use crate::recording::Recording;
 
 /// A row is on the chord where it is off by less than this share of the sagitta: what is drawn is off by rounding alone.
@@ -36,7 +36,7 @@ pub(crate) fn said(drawn: &[bool], t_s: &[f64]) -> Option<String> {
             "X and Y of {lost} of {} rows lie on straight lines between their neighbours, which a turning vibration does not: \
              {}; these rows were interpolated and are left out",
             drawn.len(),
-            places(t_s, &repeats(drawn.len(), |i| drawn[i]))
+            places(t_s, &stretches(drawn.len(), |i| drawn[i]))
         )
     })
 }

@@ -280,16 +280,21 @@ fn caught_up<'a>(mut columns: impl Iterator<Item = &'a Column<'a>>, held: &Range
     columns.any(|c| if held.end < rows { c.moved(held.end - 1, held.end) > JUMP } else { c.usual > JUMP * c.small })
 }
 
-/// Ranges of rows, the first row of a recording aside, for which `is` holds.
-pub(super) fn repeats(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+/// Ranges of rows for which `is` holds.
+pub(crate) fn stretches(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
-    for i in (1..rows).filter(|i| is(*i)) {
+    for i in (0..rows).filter(|i| is(*i)) {
         match out.last_mut() {
             Some(last) if last.end == i => last.end = i + 1,
             _ => out.push(i..i + 1),
         }
     }
     out
+}
+
+/// … of which the first row of a recording, that repeats nothing, is none.
+pub(super) fn repeats(rows: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    stretches(rows, |i| i > 0 && is(i))
 }
 
 /// Whether the table turns, by whatever was recorded of it.

@@ -3,7 +3,7 @@
 //! The rate counts the whole turns of the input from row to row. One row in which it is a million times too large makes a
 //! lever of hundreds of thousands of degrees, along which any angular gain closes to the next half turn.
 
-use crate::data::plausibility::{leave_out as leave_out_rows, places, repeats};
+use crate::data::plausibility::{leave_out as leave_out_rows, places, stretches};
 use crate::recording::Recording;
 
 /// A leap is this many times the steps that the rate usually makes, of which [`USUAL`] are smaller.
@@ -22,11 +22,7 @@ pub(super) fn leave_out(recording: &mut Recording, name: &str, warnings: &mut Ve
     if count == 0 {
         return;
     }
-    // the first row of a recording is none of a stretch
-    let mut rows = repeats(leaps.len(), |i| leaps[i]);
-    if leaps[0] {
-        rows.insert(0, 0..1);
-    }
+    let rows = stretches(leaps.len(), |i| leaps[i]);
     warnings.push(format!(
         "{name}: rate_dps leaps for single rows, which no table does: {}; {count} rows are left out",
         places(&recording.t_s, &rows)

@@ -8,7 +8,7 @@ use crate::error::Refusal;
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
-use crate::numerics::angles::wrapped;
+use crate::numerics::angles::{unwrapped, wrapped};
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
 use crate::report::belonging::{Row, counts_the_other_way, left_in_the_radius, require_of_the_calibrated};
 use crate::report::calibration::Calibration;
@@ -18,6 +18,8 @@ use crate::report::provenance::amplitude;
 const ANOTHER_UNIT: f64 = 3.0;
 /// … and by this factor, outside what was calibrated.
 const OUTSIDE: f64 = 1.2;
+/// The rate of a sensor's own angle is that over so many times what it is late by: noise of the angle then adds a tenth of itself.
+const LATENCIES: f64 = 14.0;
 /// Units that are taken for volts, and what they are called.
 const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3, "kilovolts")];
 
@@ -25,7 +27,8 @@ const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3
 ///
 /// Changed are `xc_v`, `xs_v`, `yc_v`, `ys_v` and `theta_deg`, as far as they are there; `theta_deg` is added where only
 /// the readout is there. All else is kept, the reference too. Effects that follow the table or the clock of a recording
-/// ([`left_out`]) are not undone.
+/// ([`left_out`]) are not undone. Where the calibration of a sensor follows the rate and the recording has no reference, the rate is
+/// that of the sensor's own angle.
 ///
 /// ```no_run
 /// use cvg_calibration::{calibration::Calibration, compensate, recording::Recording};
@@ -43,7 +46,9 @@ const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3
 pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Recording, Refusal> {
     let h = &portable(&calibration.hypothesis);
     same_unit(calibration, recording)?;
-    needs_no_reference(h, recording)?;
+    let rated = with_its_own_rate(calibration, recording)?;
+    let is_by_its_own_rate = rated.is_some();
+    needs_no_reference(h, rated.as_ref().unwrap_or(recording))?;
     needs_no_temperature(h, recording)?;
     let run = Run {
         kind: RunKind::Rotation,
@@ -51,7 +56,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         settle_s: 0.0,
         role: Role::Fit,
         amplitude: None,
-        recording: recording.clone(),
+        recording: rated.unwrap_or_else(|| recording.clone()),
     };
     let mut track = Track::whole(run, h.period_rad)?;
     if let Some(reference_c) = h.reference_c {
@@ -74,7 +79,8 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
             let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
             rows.push(Row {
                 t_s: track.t_s[i],
-                input_rad: track.input_rad[i],
+                // its own rate says nothing of whose it is
+                input_rad: if is_by_its_own_rate { 0.0 } else { track.input_rad[i] },
                 angle_rad: [h.bearing(&seen), h.bearing(&z) - drift_rad],
                 radius: [seen.x_c.hypot(seen.y_c), z.x_c.hypot(z.y_c)],
             });
@@ -171,13 +177,48 @@ fn needs_no_temperature(h: &Hypothesis, recording: &Recording) -> Result<(), Ref
     ))
 }
 
+/// Whether a member of a sensor's calibration is undone by what one row holds.
+fn is_of_the_row(m: &Member) -> bool {
+    m.id.description().stage == Stage::Readout && !m.id.acts_on_angle()
+}
+
+/// A sensor's recording without a reference, with the rate of its own angle as that of its input where the calibration follows the
+/// rate: a sensor that is bolted to what turns it turns as fast.
+fn with_its_own_rate(calibration: &Calibration, recording: &Recording) -> Result<Option<Recording>, Refusal> {
+    let h = portable(&calibration.hypothesis);
+    let has_reference = recording.rate_dps.is_some() || recording.table_deg.is_some();
+    if h.instrument != Instrument::Sensor || has_reference || h.members.iter().all(is_of_the_row) {
+        return Ok(None);
+    }
+    let still = Hypothesis { members: h.members.iter().copied().filter(is_of_the_row).collect(), ..h.clone() };
+    let still = compensate(&Calibration { hypothesis: still, ..calibration.clone() }, recording)?;
+    let Some(theta) = still.theta_deg else { return Ok(None) };
+    let angle: Vec<f64> = unwrapped(theta.iter().map(|v| v.to_radians()), h.period_rad);
+    let rate = rate(&recording.t_s, &angle, LATENCIES * h.latency_s().abs());
+    let per_input = h.precession(1.0);
+    let rate_dps = rate.iter().map(|r| (r / per_input).to_degrees()).collect();
+    Ok(Some(Recording { rate_dps: Some(rate_dps), ..recording.clone() }))
+}
+
+/// Rate of an angle over so much time about each row, and over two rows at least.
+fn rate(t_s: &[f64], angle: &[f64], over_s: f64) -> Vec<f64> {
+    let last = t_s.len().saturating_sub(1);
+    let slope = |i: usize| {
+        let (mut from, mut to) = (i.saturating_sub(1), (i + 1).min(last));
+        while t_s[to] - t_s[from] < over_s && (from > 0 || to < last) {
+            (from, to) = (from.saturating_sub(1), (to + 1).min(last));
+        }
+        (angle[to] - angle[from]) / (t_s[to] - t_s[from]).max(f64::MIN_POSITIVE)
+    };
+    (0..t_s.len()).map(slope).collect()
+}
+
 /// A recording without a reference can be compensated where nothing follows the rate.
 fn needs_no_reference(h: &Hypothesis, recording: &Recording) -> Result<(), Refusal> {
     if recording.rate_dps.is_some() || recording.table_deg.is_some() {
         return Ok(());
     }
-    let readout = |m: &Member| m.id.description().stage == Stage::Readout && !m.id.acts_on_angle();
-    if h.instrument == Instrument::Sensor && h.members.iter().all(readout) {
+    if h.instrument == Instrument::Sensor && h.members.iter().all(is_of_the_row) {
         return Ok(());
     }
     recording.require_rotation()?;

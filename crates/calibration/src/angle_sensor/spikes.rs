@@ -1,0 +1,232 @@
+//! Damaged rows of two channels: a bit that flipped, a sample that a spark hit. Points of one sensor draw one closed curve, and
+//! a damaged one lies beside it while those before and after, in time and in position, do not.
+//!
+//! The ellipse that tells is that of the median: of ellipses through a few points each, the one from which half of all rows are
+//! the least apart (least median of squares, Rousseeuw 1984), then fitted once more to the rows near it. A fit to all rows
+//! would be drawn towards the damage. A damaged point that lies on the ellipse all the same, mirrored, is off in its angle for a row.
+
+use std::f64::consts::TAU;
+
+use super::ellipse::through;
+use super::rails::Rails;
+use super::readout::Readout;
+use super::samples::SensorRun;
+use crate::data::plausibility::{MOST_LOST, places, stretches};
+use crate::numerics::angles::{unwrapped, wrapped};
+use crate::numerics::statistics::{line, median, span};
+
+/// A run of fewer rows has no usual distance from its ellipse.
+const FEWEST_ROWS: usize = 40;
+/// Ellipses that are tried, each through so many points: with one row in five damaged, one in six has sound points only.
+const TRIED: usize = 100;
+const POINTS: usize = 8;
+/// Rows that judge them.
+const ENOUGH_ROWS: usize = 1000;
+/// Fits to the rows near the ellipse, and how near, in standard deviations.
+const REFITS: usize = 3;
+const NEAR: f64 = 4.0;
+/// A damaged row is so many standard deviations off: the distances of a million sound ones in normal noise are below five.
+const OFF: f64 = 10.0;
+/// … and by this share of the amplitude: one row in a hundred that is off by less moves a gain by less than noise does.
+const LEAST: f64 = 0.02;
+/// An angle leaps by this at least, rad: what is mirrored at an axis is off by twice the spike, and an error that begins to last grows by
+/// less from row to row.
+const LEAST_LEAP: f64 = 0.05;
+/// Rows on either side, in time and in position, that are compared with it.
+const BESIDE: usize = 2;
+/// … nearly all of which are off by less than this share of it.
+const SOUND: f64 = 0.3;
+/// An angle leaps where the reference goes on in steps, of the angle, below this, rad.
+const LARGEST_STEP: f64 = 0.125 * TAU;
+/// 1.4826 times the median of what is normally distributed is its standard deviation.
+const DEVIATION_OF_MEDIAN: f64 = 1.4826;
+
+/// The runs without damaged rows. Says of which.
+pub(super) fn without_spikes(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Vec<SensorRun> {
+    let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
+    let sound = |run: SensorRun| {
+        let damaged = damaged_rows(&run, &rails);
+        let count = damaged.iter().filter(|is| **is).count();
+        if count == 0 || count as f64 > MOST_LOST * run.len() as f64 {
+            return run;
+        }
+        warnings.push(format!(
+            "{}: {count} rows lie off the ellipse that the others draw, or on it where those beside them are not, each by itself: {}; they \
+             are damaged and left out",
+            run.name,
+            places(&run.t_s, &stretches(run.len(), |i| damaged[i]))
+        ));
+        run.subset(&(0..run.len()).filter(|i| !damaged[*i]).collect::<Vec<_>>())
+    };
+    runs.into_iter().map(sound).collect()
+}
+
+fn damaged_rows(run: &SensorRun, rails: &Rails) -> Vec<bool> {
+    let rows = run.len();
+    let found = run.channels().filter(|_| rows >= FEWEST_ROWS).and_then(|v| Some((v, usual_ellipse(v)?)));
+    let Some((channels, ellipse)) = found else { return vec![false; rows] };
+    let off: Vec<f64> = channels.iter().map(|z| distance(&ellipse, *z)).collect();
+    let far = |i: &usize| !rails.clips(channels[*i]);
+    let mut damaged = alone(&off, &run.reference_rad, beyond_usual(&off).into_iter().filter(far));
+    for row in leaps(run, channels, &ellipse, &damaged) {
+        damaged[row] = true;
+    }
+    damaged
+}
+
+/// Rows that are off by far more than the usual one.
+fn beyond_usual(off: &[f64]) -> Vec<usize> {
+    let least = f64::max(OFF * DEVIATION_OF_MEDIAN * median(&mut off.to_vec()), LEAST);
+    (0..off.len()).filter(|i| off[*i] > least).collect()
+}
+
+/// Which of the rows `far` are off while those beside them, in time and in position, are not.
+fn alone(off: &[f64], reference_rad: &[f64], far: impl Iterator<Item = usize>) -> Vec<bool> {
+    let rows = off.len();
+    let mut out = vec![false; rows];
+    let mut by_position: Vec<usize> = (0..rows).collect();
+    let position = |i: usize| reference_rad[i].rem_euclid(TAU);
+    by_position.sort_by(|a, b| position(*a).total_cmp(&position(*b)));
+    let mut place = vec![0; rows];
+    by_position.iter().enumerate().for_each(|(at, row)| place[*row] = at);
+    let is_alone = |row: usize, around: &dyn Fn(usize) -> f64, at: usize| {
+        let like_it = beside(at, rows).filter(|j| around(*j) > SOUND * off[row]).count();
+        // two that are damaged may stand side by side
+        like_it <= 1
+    };
+    for row in far {
+        out[row] = is_alone(row, &|j| off[j], row) && is_alone(row, &|j| off[by_position[j]], place[row]);
+    }
+    out
+}
+
+/// Rows, of those that are not damaged, whose angle is off for them alone while the reference goes on in small steps.
+fn leaps(run: &SensorRun, channels: &[[f64; 2]], ellipse: &Readout, damaged: &[bool]) -> Vec<usize> {
+    let rows: Vec<usize> = (0..run.len()).filter(|i| !damaged[*i]).collect();
+    let reference: Vec<f64> = rows.iter().map(|i| run.reference_rad[*i]).collect();
+    if span(&reference) <= 0.0 {
+        return Vec::new();
+    }
+    let theta = unwrapped(rows.iter().map(|i| ellipse.angle(channels[*i])), TAU);
+    let (gain, _) = line(&reference, &theta);
+    let mut steps: Vec<f64> = reference.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
+    if median(&mut steps) > LARGEST_STEP {
+        return Vec::new();
+    }
+    let error: Vec<f64> = theta.iter().zip(&reference).map(|(t, a)| t - gain * a).collect();
+    let leap =
+        |i: usize| beside(i, rows.len()).map(|j| wrapped(error[i] - error[j], TAU).abs()).fold(f64::INFINITY, f64::min);
+    let off: Vec<f64> = (0..rows.len()).map(leap).collect();
+    beyond_usual(&off).into_iter().filter(|i| off[*i] > LEAST_LEAP).map(|i| rows[i]).collect()
+}
+
+/// The rows on either side of one.
+fn beside(at: usize, rows: usize) -> impl Iterator<Item = usize> {
+    (at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(rows)).filter(move |j| *j != at)
+}
+
+/// The ellipse that most points lie near.
+fn usual_ellipse(channels: &[[f64; 2]]) -> Option<Readout> {
+    let some: Vec<[f64; 2]> = channels.iter().step_by((channels.len() / ENOUGH_ROWS).max(1)).copied().collect();
+    let mut best: Option<(f64, Readout)> = None;
+    for first in 0..TRIED {
+        // the multiples of the golden ratio are spread as evenly as any
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the rows")]
+        let row = |j: usize| ((((first * POINTS + j) as f64 * 0.618_033_988_75) % 1.0) * some.len() as f64) as usize;
+        let Some(ellipse) = through((0..POINTS).map(|j| &some[row(j)])) else { continue };
+        let typical = median(&mut some.iter().map(|z| distance(&ellipse, *z)).collect::<Vec<_>>());
+        if best.as_ref().is_none_or(|(least, _)| typical < *least) {
+            best = Some((typical, ellipse));
+        }
+    }
+    let (_, mut ellipse) = best?;
+    for _ in 0..REFITS {
+        let usual = DEVIATION_OF_MEDIAN * median(&mut some.iter().map(|z| distance(&ellipse, *z)).collect::<Vec<_>>());
+        let near: Vec<[f64; 2]> = some.iter().filter(|z| distance(&ellipse, **z) <= NEAR * usual).copied().collect();
+        ellipse = through(near.iter())?;
+    }
+    Some(ellipse)
+}
+
+fn distance(ellipse: &Readout, z: [f64; 2]) -> f64 {
+    let [x, y] = ellipse.undo(z);
+    (x.hypot(y) - 1.0).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::Reading;
+    use super::*;
+    use crate::numerics::statistics::remembered;
+    use crate::recording::Role;
+
+    /// Ten turns of channels of unlike gain, with noise of a thousandth, in this order of their rows.
+    fn run(rows: usize, of: impl Fn(usize, f64) -> [f64; 2]) -> SensorRun {
+        let reference_rad: Vec<f64> = (0..rows).map(|i| 10.0 * TAU * i as f64 / rows as f64).collect();
+        let noise = remembered(0.0, 2 * rows, 11);
+        let reading = reference_rad.iter().enumerate().map(|(i, a)| {
+            let [x, y] = of(i, *a);
+            [x + 0.001 * noise[2 * i], y + 0.001 * noise[2 * i + 1]]
+        });
+        SensorRun {
+            name: "sensor.csv".into(),
+            number: 0,
+            role: Role::Fit,
+            commanded: false,
+            t_s: (0..rows).map(|i| 0.01 * i as f64).collect(),
+            rate_rad_s: vec![1.0; rows],
+            acceleration_rad_s2: vec![0.0; rows],
+            temp_c: None,
+            recorded: None,
+            reading: Reading::Channels(reading.collect()),
+            reference_rad,
+        }
+    }
+
+    fn ellipse(a: f64) -> [f64; 2] {
+        [0.02 + a.cos(), 1.03 * a.sin() + 0.01 * a.cos()]
+    }
+
+    fn left(run: &SensorRun) -> (usize, Vec<String>) {
+        let mut warnings = Vec::new();
+        let left = without_spikes(vec![run.clone()], &mut warnings);
+        (run.len() - left[0].len(), warnings)
+    }
+
+    #[test]
+    fn rows_that_a_spark_hit_are_named_and_left_out() {
+        for (every, size) in [(101, 1.0), (11, 0.3), (7, -2.0)] {
+            let spiked = run(2000, |i, a| {
+                let [x, y] = ellipse(a);
+                [x, y + if i % every == 3 { size } else { 0.0 }]
+            });
+            let planted = (0..2000).filter(|i| i % every == 3).count();
+            let (lost, warnings) = left(&spiked);
+            // some are mirrored and lie on the ellipse
+            assert!(lost >= planted - 1 && lost <= planted, "{lost} of {planted} of {size}");
+            assert!(warnings[0].contains("off the ellipse that the others draw"), "{warnings:?}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_the_rows_does_not_matter() {
+        let spiked = run(2000, |i, a| if i == 703 { [0.0, 0.0] } else { ellipse(a) });
+        let shuffled = spiked.subset(&(0..2000).map(|i| (i * 7919) % 2000).collect::<Vec<_>>());
+        assert_eq!((left(&spiked).0, left(&shuffled).0), (1, 1));
+    }
+
+    #[test]
+    fn what_a_sensor_does_at_a_position_or_for_a_time_is_no_damage() {
+        let bent = run(2000, |_, a| ellipse(a + 0.05 * (3.0 * a).sin()).map(|v| v - 0.2 * v.powi(3)));
+        let notched = run(2000, |_, a| ellipse(a).map(|v| if a % TAU < 0.05 { 0.8 * v } else { v }));
+        let warmed = run(2000, |i, a| ellipse(a).map(|v| v * (1.0 + 1e-4 * i as f64)));
+        let clipped = run(2000, |_, a| ellipse(a).map(|v| v.min(0.9)));
+        for (name, run) in [("bent", bent), ("notched", notched), ("warmed", warmed), ("clipped", clipped)] {
+            for run in [&run, &run.subset(&(0..2000).map(|i| (i * 7919) % 2000).collect::<Vec<_>>())] {
+                assert_eq!(left(run), (0, vec![]), "{name}");
+            }
+        }
+        let knocked = run(2000, |i, a| ellipse(a).map(|v| if (900..920).contains(&i) { v + 0.3 } else { v }));
+        assert_eq!(left(&knocked), (0, vec![]));
+    }
+}
