@@ -14,19 +14,19 @@ pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {
 
 /// … and through these points.
 pub(super) fn through<'a>(points: impl Iterator<Item = &'a [f64; 2]> + Clone) -> Option<Readout> {
-    let points = || points.clone();
-    let count = points().count() as f64;
+    let count = points.clone().count() as f64;
     if count < 6.0 {
         return None;
     }
-    let mean = [0, 1].map(|c| points().map(|z| z[c]).sum::<f64>() / count);
-    let variance: f64 = points().map(|z| (z[0] - mean[0]).powi(2) + (z[1] - mean[1]).powi(2)).sum::<f64>() / count;
+    let mean = [0, 1].map(|c| points.clone().map(|z| z[c]).sum::<f64>() / count);
+    let variance: f64 =
+        points.clone().map(|z| (z[0] - mean[0]).powi(2) + (z[1] - mean[1]).powi(2)).sum::<f64>() / count;
     let size = variance.sqrt();
     if !(size > 0.0 && size.is_finite()) {
         return None;
     }
     let mut equations = NormalEquations::new(5);
-    for z in points() {
+    for z in points {
         let (x, y) = ((z[0] - mean[0]) / size, (z[1] - mean[1]) / size);
         equations.add(&[x * x, x * y, y * y, x, y], 1.0);
     }

@@ -66,8 +66,12 @@ fn damaged_rows(run: &SensorRun, rails: &Rails) -> Vec<bool> {
     let found = run.channels().filter(|_| rows >= FEWEST_ROWS).and_then(|v| Some((v, usual_ellipse(v)?)));
     let Some((channels, ellipse)) = found else { return vec![false; rows] };
     let off: Vec<f64> = channels.iter().map(|z| distance(&ellipse, *z)).collect();
-    let far = |i: &usize| !rails.clips(channels[*i]);
-    let mut damaged = alone(&off, &run.reference_rad, beyond_usual(&off).into_iter().filter(far));
+    let is_whole = |i: &usize| !rails.clips(channels[*i]);
+    let far: Vec<usize> = beyond_usual(&off).into_iter().filter(is_whole).collect();
+    let mut damaged = vec![false; rows];
+    for row in alone(&off, &run.reference_rad, &far) {
+        damaged[row] = true;
+    }
     for row in leaps(run, channels, &ellipse, &damaged) {
         damaged[row] = true;
     }
@@ -80,10 +84,12 @@ fn beyond_usual(off: &[f64]) -> Vec<usize> {
     (0..off.len()).filter(|i| off[*i] > least).collect()
 }
 
-/// Which of the rows `far` are off while those beside them, in time and in position, are not.
-fn alone(off: &[f64], reference_rad: &[f64], far: impl Iterator<Item = usize>) -> Vec<bool> {
+/// Those of the rows `far` that are off while those beside them, in time and in position, are not.
+fn alone(off: &[f64], reference_rad: &[f64], far: &[usize]) -> Vec<usize> {
     let rows = off.len();
-    let mut out = vec![false; rows];
+    if far.is_empty() {
+        return Vec::new();
+    }
     let mut by_position: Vec<usize> = (0..rows).collect();
     let position = |i: usize| reference_rad[i].rem_euclid(TAU);
     by_position.sort_by(|a, b| position(*a).total_cmp(&position(*b)));
@@ -94,10 +100,9 @@ fn alone(off: &[f64], reference_rad: &[f64], far: impl Iterator<Item = usize>) -
         // two that are damaged may stand side by side
         like_it <= 1
     };
-    for row in far {
-        out[row] = is_alone(row, &|j| off[j], row) && is_alone(row, &|j| off[by_position[j]], place[row]);
-    }
-    out
+    let in_both =
+        |row: &usize| is_alone(*row, &|j| off[j], *row) && is_alone(*row, &|j| off[by_position[j]], place[*row]);
+    far.iter().copied().filter(in_both).collect()
 }
 
 /// Rows, of those that are not damaged, whose angle is off for them alone while the reference goes on in small steps.
@@ -117,7 +122,8 @@ fn leaps(run: &SensorRun, channels: &[[f64; 2]], ellipse: &Readout, damaged: &[b
     let leap =
         |i: usize| beside(i, rows.len()).map(|j| wrapped(error[i] - error[j], TAU).abs()).fold(f64::INFINITY, f64::min);
     let off: Vec<f64> = (0..rows.len()).map(leap).collect();
-    beyond_usual(&off).into_iter().filter(|i| off[*i] > LEAST_LEAP).map(|i| rows[i]).collect()
+    let far: Vec<usize> = beyond_usual(&off).into_iter().filter(|i| off[*i] > LEAST_LEAP).collect();
+    alone(&off, &reference, &far).into_iter().map(|i| rows[i]).collect()
 }
 
 /// The rows on either side of one.
@@ -219,9 +225,12 @@ mod tests {
     fn what_a_sensor_does_at_a_position_or_for_a_time_is_no_damage() {
         let bent = run(2000, |_, a| ellipse(a + 0.05 * (3.0 * a).sin()).map(|v| v - 0.2 * v.powi(3)));
         let notched = run(2000, |_, a| ellipse(a).map(|v| if a % TAU < 0.05 { 0.8 * v } else { v }));
+        let flawed = run(2000, |_, a| ellipse(if a % TAU < 0.05 { a + 0.2 } else { a }));
         let warmed = run(2000, |i, a| ellipse(a).map(|v| v * (1.0 + 1e-4 * i as f64)));
         let clipped = run(2000, |_, a| ellipse(a).map(|v| v.min(0.9)));
-        for (name, run) in [("bent", bent), ("notched", notched), ("warmed", warmed), ("clipped", clipped)] {
+        for (name, run) in
+            [("bent", bent), ("notched", notched), ("flawed", flawed), ("warmed", warmed), ("clipped", clipped)]
+        {
             for run in [&run, &run.subset(&(0..2000).map(|i| (i * 7919) % 2000).collect::<Vec<_>>())] {
                 assert_eq!(left(run), (0, vec![]), "{name}");
             }
