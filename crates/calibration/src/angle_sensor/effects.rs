@@ -145,13 +145,10 @@ impl Described<'_> {
         let (side, d) = (&self.model.table.side, &self.deviations.side);
         let gain = self.model.sensor.gain;
         let lag = || {
-            if side[0] == 0.0 {
-                return None;
-            }
             let p = vec![parameter("latency", "s", -side[0] / gain, d[0] / gain.abs())];
             let signature = EffectId::AngleLatency.description().signature;
             let evidence = format!("{signature}; {}", self.evidence());
-            Some(effect(library_id(EffectId::AngleLatency), Origin::Discovered, p, evidence))
+            effect(library_id(EffectId::AngleLatency), Origin::Discovered, p, evidence)
         };
         match self.model.table.shape.motion {
             Motion::None => Vec::new(),
@@ -164,11 +161,12 @@ impl Described<'_> {
                 let evidence = format!("a constant that changes sign with the direction; {}", self.evidence());
                 vec![effect(library_id(EffectId::HarmonicN), Origin::Empirical, p, evidence)]
             }
-            Motion::Rate => lag().into_iter().collect(),
+            Motion::Rate => vec![lag()],
             Motion::RateAndAcceleration => {
                 let p = vec![parameter("acceleration_lag", "s^2", -side[1] / gain, d[1] / gain.abs())];
                 let evidence = format!("angle ∝ acceleration, as of a type-II tracking loop; {}", self.evidence());
-                lag().into_iter().chain([effect("acceleration-lag", Origin::Empirical, p, evidence)]).collect()
+                let late = (side[0] != 0.0).then(lag);
+                late.into_iter().chain([effect("acceleration-lag", Origin::Empirical, p, evidence)]).collect()
             }
         }
     }
@@ -243,6 +241,7 @@ impl Described<'_> {
                 let amplitude = side[0] * m.sensor.gain.signum();
                 admit(EffectId::HarmonicN, Origin::Empirical, [0.0, amplitude, 0.0, harmonic_n::scaling::DIRECTION]);
             }
+            Motion::RateAndAcceleration if side[0] == 0.0 => {}
             Motion::Rate | Motion::RateAndAcceleration => {
                 admit(EffectId::AngleLatency, Origin::Discovered, [-side[0] / m.sensor.gain, 0.0, 0.0, 0.0]);
             }

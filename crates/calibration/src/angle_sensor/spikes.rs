@@ -13,7 +13,7 @@ use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::data::plausibility::{MOST_LOST, places, stretches};
 use crate::numerics::angles::{unwrapped, wrapped};
-use crate::numerics::statistics::{line, median, span};
+use crate::numerics::statistics::{line, median, robust_deviation, span};
 
 /// A run of fewer rows has no usual distance from its ellipse.
 const FEWEST_ROWS: usize = 40;
@@ -38,8 +38,6 @@ const BESIDE: usize = 2;
 const SOUND: f64 = 0.3;
 /// An angle leaps where the reference goes on in steps, of the angle, below this, rad.
 const LARGEST_STEP: f64 = 0.125 * TAU;
-/// 1.4826 times the median of what is normally distributed is its standard deviation.
-const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 
 /// The runs without damaged rows. Says of which.
 pub(super) fn without_spikes(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Vec<SensorRun> {
@@ -80,7 +78,7 @@ fn damaged_rows(run: &SensorRun, rails: &Rails) -> Vec<bool> {
 
 /// Rows that are off by far more than the usual one.
 fn beyond_usual(off: &[f64]) -> Vec<usize> {
-    let least = f64::max(OFF * DEVIATION_OF_MEDIAN * median(&mut off.to_vec()), LEAST);
+    let least = f64::max(OFF * robust_deviation(off.iter().copied()), LEAST);
     (0..off.len()).filter(|i| off[*i] > least).collect()
 }
 
@@ -140,14 +138,14 @@ fn usual_ellipse(channels: &[[f64; 2]]) -> Option<Readout> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the rows")]
         let row = |j: usize| ((((first * POINTS + j) as f64 * 0.618_033_988_75) % 1.0) * some.len() as f64) as usize;
         let Some(ellipse) = through((0..POINTS).map(|j| &some[row(j)])) else { continue };
-        let typical = median(&mut some.iter().map(|z| distance(&ellipse, *z)).collect::<Vec<_>>());
+        let typical = robust_deviation(some.iter().map(|z| distance(&ellipse, *z)));
         if best.as_ref().is_none_or(|(least, _)| typical < *least) {
             best = Some((typical, ellipse));
         }
     }
     let (_, mut ellipse) = best?;
     for _ in 0..REFITS {
-        let usual = DEVIATION_OF_MEDIAN * median(&mut some.iter().map(|z| distance(&ellipse, *z)).collect::<Vec<_>>());
+        let usual = robust_deviation(some.iter().map(|z| distance(&ellipse, *z)));
         let near: Vec<[f64; 2]> = some.iter().filter(|z| distance(&ellipse, **z) <= NEAR * usual).copied().collect();
         ellipse = through(near.iter())?;
     }
