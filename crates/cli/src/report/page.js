@@ -112,12 +112,13 @@
       act(target);
     });
 
-  // what is in sight is drawn first, the rest when there is time
+  // what is in sight is drawn first, the rest while the reader asks for nothing
   const queue = [...figures];
+  const whenIdle = window.requestIdleCallback ? (f) => requestIdleCallback(f, { timeout: 500 }) : setTimeout;
   const next = () => {
     const figure = queue.shift();
     if (!figure) { root.dataset.ready = "true"; return; }
-    draw(figure).then(() => setTimeout(next));
+    draw(figure).then(() => whenIdle(next));
   };
   requestAnimationFrame(() => setTimeout(next));
   addEventListener("beforeprint", () => { root.dataset.theme = "light"; figures.forEach((f) => draw(f, "light", 680)); });
