@@ -347,9 +347,7 @@ fn a_dead_zone_of_the_readout_is_not_taken_for_a_cubic_and_a_quintic() {
         let share = 1.0 - std::f64::consts::FRAC_2_PI * (r.asin() + r * (1.0 - r * r).sqrt());
         (re * share, im * share)
     };
-    // recorded half as often: each of many harmonics is searched for
-    let plain = plain_paper();
-    let folder = read_otherwise(Settings { sample_hz: plain.sample_hz / 2.0, ..plain }, |_, e| {
+    let folder = read_otherwise(plain_paper(), |_, e| {
         let ((x_c, x_s), (y_c, y_s)) = (read(e.x_c, e.x_s), read(e.y_c, e.y_s));
         Envelope::new(x_c, x_s, y_c, y_s)
     });
