@@ -9,9 +9,10 @@ import axe from "axe-core";
 import { chromium } from "playwright-core";
 
 const LARGEST_BYTES = 2_000_000;
-// the work to open a report until its first figure is drawn, as a multiple of that of a page with one figure of two points and
-// the same library: 1.4 to 2.1 times as much was measured, and one machine and another differ by a quarter
-const MOST_WORK = 2.8;
+// the work until the first figure can be read, and until all can, as multiples of that of a page with one figure of two points
+// and the same library: a fifth above the most that eleven runs took, 2.03 and 5.09
+const MOST_WORK = 2.5;
+const MOST_WORK_FOR_ALL = 6.2;
 const WIDTHS = [390, 820, 1440];
 
 const [report, folder] = process.argv.slice(2).map((p) => resolve(p));
@@ -32,11 +33,12 @@ const library = readFileSync(report, "utf8").match(/<script type="text\/javascri
 writeFileSync(
   smallest,
   `<!doctype html><title>one figure</title><div id="plot-one" class="plot" style="height:400px"></div>${library}
-<script>Plotly.newPlot("plot-one", [{ x: [1, 2], y: [1, 2] }]).then((p) => { p.dataset.drawn = "true"; });</script>`,
+<script>Plotly.newPlot("plot-one", [{ x: [1, 2], y: [1, 2] }]).then((p) => {
+p.dataset.drawn = document.documentElement.dataset.ready = "true"; });</script>`,
 );
 
-// Loads a page until its first figure can be read, and gives the processor time of its main thread, which other work on
-// the machine does not lengthen. What the page leaves for when nothing is asked of it waits until that is known.
+// Loads a page, and gives the processor time of its main thread, which other work on the machine does not lengthen: until
+// its first figure can be read, and until all can. What the page leaves for when nothing is asked of it is held back between.
 async function load(context, page, file) {
   const session = await context.newCDPSession(page);
   await session.send("Performance.enable", { timeDomain: "threadTicks" });
@@ -51,9 +53,15 @@ async function load(context, page, file) {
   });
   await page.goto(pathToFileURL(file).href, { waitUntil: "load" });
   await page.waitForSelector(".plot[data-drawn]", { timeout: 30000 });
-  const { metrics } = await session.send("Performance.getMetrics");
+  const work_ms = async () => {
+    const { metrics } = await session.send("Performance.getMetrics");
+    return 1000 * metrics.find((m) => m.name === "TaskDuration").value;
+  };
+  const first_ms = await work_ms();
+  assert.equal(await page.locator(".plot[data-drawn]").count(), 1, "figures that nobody waits for are drawn with the first");
   await page.evaluate(() => window.release());
-  return 1000 * metrics.find((m) => m.name === "TaskDuration").value;
+  await page.waitForSelector("html[data-ready]", { timeout: 60000 });
+  return { first_ms, all_ms: await work_ms() };
 }
 
 const worked_ms = [];
@@ -61,7 +69,7 @@ const least_ms = [];
 
 async function open(width, colorScheme) {
   const bare = await browser.newContext({ viewport: { width, height: 900 }, colorScheme });
-  least_ms.push(await load(bare, await bare.newPage(), smallest));
+  least_ms.push((await load(bare, await bare.newPage(), smallest)).first_ms);
   await bare.close();
   const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme });
   const page = await context.newPage();
@@ -71,7 +79,6 @@ async function open(width, colorScheme) {
     if (!/^(file|data|blob):/.test(r.url())) complaints.push(`fetches ${r.url()}`);
   });
   worked_ms.push(await load(context, page, report));
-  await page.waitForSelector("html[data-ready]", { timeout: 60000 });
   return { context, page };
 }
 
@@ -147,14 +154,19 @@ try {
 
   const { context, page } = await open(1440, "light");
   // what else runs on the machine makes either slower, never faster
-  const work_ms = Math.min(...worked_ms);
   const floor_ms = Math.min(...least_ms);
-  const ratio = work_ms / floor_ms;
-  console.log(
-    `opens with ${ratio.toFixed(2)} times the work of the smallest page (${work_ms.toFixed(0)} and ${floor_ms.toFixed(0)} ms, ` +
-      `best of ${worked_ms.length}), ${statSync(report).size} bytes`,
-  );
-  assert.ok(floor_ms > 0 && ratio < MOST_WORK, `${ratio} times the work of the smallest page`);
+  assert.ok(floor_ms > 0);
+  const sorts = [["its first figure", "first_ms", MOST_WORK], ["all of them", "all_ms", MOST_WORK_FOR_ALL]];
+  for (const [until, key, most] of sorts) {
+    const work_ms = Math.min(...worked_ms.map((worked) => worked[key]));
+    const ratio = work_ms / floor_ms;
+    console.log(
+      `opens with ${ratio.toFixed(2)} times the work of the smallest page until ${until} can be read ` +
+        `(${work_ms.toFixed(0)} and ${floor_ms.toFixed(0)} ms, best of ${worked_ms.length})`,
+    );
+    assert.ok(ratio < most, `${ratio} times the work of the smallest page until ${until} can be read`);
+  }
+  console.log(`${statSync(report).size} bytes`);
   const raw = page.locator("button[data-series=raw]");
   const switched = (await raw.count()) > 0;
   // the figure that has switches, or the first

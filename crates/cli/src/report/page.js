@@ -112,7 +112,7 @@
       act(target);
     });
 
-  // what is in sight is drawn first, the rest while the reader asks for nothing
+  // the first is drawn at once, the rest while the reader asks for nothing
   const queue = [...figures];
   const whenIdle = window.requestIdleCallback ? (f) => requestIdleCallback(f, { timeout: 500 }) : setTimeout;
   const next = () => {
