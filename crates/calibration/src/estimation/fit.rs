@@ -211,7 +211,7 @@ pub(crate) fn fit(
 }
 
 /// A fit before its first step.
-pub(super) fn at_rest(tracks: &[Prepared], hypothesis: &Hypothesis, unknowns: &[Unknown]) -> Fit {
+pub(crate) fn at_rest(tracks: &[Prepared], hypothesis: &Hypothesis, unknowns: &[Unknown]) -> Fit {
     let n = unknowns.len();
     Fit {
         hypothesis: hypothesis.clone(),

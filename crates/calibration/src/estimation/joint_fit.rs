@@ -179,11 +179,6 @@ impl Dataset {
         all
     }
 
-    /// The runs were left by another fit than this.
-    pub(crate) fn disturbed(&self, fit: &Fit) -> bool {
-        self.tracks.iter().zip(&fit.starts).any(|(p, s)| p.starts != *s)
-    }
-
     /// By what factor the residuals exceed their white part: the median over fitted tracks.
     pub(crate) fn excess(&self) -> f64 {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
@@ -353,15 +348,28 @@ impl Dataset {
         (result, settled)
     }
 
-    /// Noise, limits and starts of the runs.
-    fn state(&self) -> Vec<([Noise; 3], Vec<Start>)> {
-        self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect()
+    fn weighting(&self) -> Weighting {
+        Weighting {
+            runs: self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect(),
+            energy_balance: self.energy_balance,
+            quadrature_balance: self.quadrature_balance,
+            drive_is_free: self.drive_is_free,
+        }
     }
 
-    fn restore(&mut self, state: Vec<([Noise; 3], Vec<Start>)>) {
-        for (p, ([noise, white, limit], starts)) in self.tracks.iter_mut().zip(state) {
-            (p.noise, p.white, p.limit, p.starts) = (noise, white, limit, starts);
+    fn weigh_by(&mut self, weighting: &Weighting) {
+        for (p, ([noise, white, limit], starts)) in self.tracks.iter_mut().zip(&weighting.runs) {
+            (p.noise, p.white, p.limit) = (*noise, *white, *limit);
+            p.starts.clone_from(starts);
         }
+        self.energy_balance = weighting.energy_balance;
+        self.quadrature_balance = weighting.quadrature_balance;
+        self.drive_is_free = weighting.drive_is_free;
+    }
+
+    /// Weighs the runs by what a fit left of them: trials after it leave them as their own fits had them.
+    pub(crate) fn restore(&mut self, fitted: &Fitted) {
+        self.weigh_by(&fitted.weighting);
     }
 
     /// Measures the noise of every track from what a fit leaves, and sets the limits beyond which a residual is a spike.
@@ -449,6 +457,17 @@ pub(crate) struct Fitted {
     pub(crate) fit: Fit,
     pub(crate) ring_downs: Vec<RingDown>,
     pub(crate) drive: Option<DriveGains>,
+    weighting: Weighting,
+}
+
+/// What a fit leaves the runs weighted by, for those that go on from it: noise, its white part, limits and starts of every run,
+/// what the balances tell, and whether the drive is adjusted.
+#[derive(Debug)]
+struct Weighting {
+    runs: Vec<([Noise; 3], Vec<Start>)>,
+    energy_balance: Option<(f64, f64)>,
+    quadrature_balance: Option<([f64; 2], f64)>,
+    drive_is_free: bool,
 }
 
 /// The paper's model for an instrument: the effects that are declared.
@@ -520,7 +539,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             continue;
         }
         if explains.is_none() && !dataset.drive_is_free && dataset.tells_the_drive() {
-            let (held, before) = (dataset.state(), dataset.excess());
+            let (held, before) = (dataset.weighting(), dataset.excess());
             dataset.drive_is_free = true;
             let (freed, _) = dataset.fitted(&hypothesis, drive.as_ref(), Effort::FULL);
             // a ratio of the drives that nobody believes explains nothing
@@ -531,9 +550,8 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
                 (hypothesis, round) = (freed.hypothesis, ROUNDS);
                 continue;
             }
-            dataset.drive_is_free = false;
-            dataset.restore(held);
+            dataset.weigh_by(&held);
         }
-        return Ok(Fitted { fit: result, ring_downs, drive });
+        return Ok(Fitted { fit: result, ring_downs, drive, weighting: dataset.weighting() });
     }
 }

@@ -16,7 +16,7 @@ use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;
 use crate::selection::step::{Accepted, State, member_of};
-use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, restore, validated};
+use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, validated};
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
 const TOLERATED_SHARE: f64 = 0.15;
@@ -122,7 +122,7 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
                 steps[own].inconsistency = Some(why);
             }
         }
-        restore(dataset, fitted)?;
+        dataset.restore(fitted);
     }
     Ok(())
 }
@@ -167,6 +167,7 @@ pub(super) fn rival_that_explains(
         let mut hypothesis = fitted.fit.hypothesis.clone();
         hypothesis.members.remove(at);
         let place = hypothesis.admit(*id, Origin::Discovered);
+        dataset.restore(fitted);
         let next = fit_with_ring_downs(dataset, &hypothesis)?;
         let borne_out = explains(dataset, &next, fitted) && inconsistency(dataset, &next.fit, place).is_none();
         if borne_out && found.replace((*id, next)).is_some() {

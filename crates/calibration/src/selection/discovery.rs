@@ -23,7 +23,7 @@ use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
     BY_AMPLITUDE, Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN,
-    NOTHING_LEFT, REFUTED, Trial, balance, count, extend_from, mean_square, on_fit, price, refit, restore, sample_cost,
+    NOTHING_LEFT, REFUTED, Trial, balance, count, extend_from, mean_square, on_fit, price, refit, sample_cost,
     validated,
 };
 
@@ -42,22 +42,22 @@ pub(crate) fn discover(
     let mut steps: Vec<Accepted> = Vec::new();
     while steps.len() < MOST_EFFECTS {
         progress(&format!("step {}: candidates compete", steps.len() + 1));
-        if let Some((next, step)) = best_step(dataset, &fitted)? {
+        if let Some((next, step)) = best_step(dataset, &fitted, |_| true)? {
             fitted = next;
             steps.push(step);
             continue;
         }
-        restore(dataset, &mut fitted)?;
+        dataset.restore(&fitted);
         if let Some((next, pair)) = best_pair(dataset, &fitted)? {
             fitted = next;
             steps.extend(pair);
             continue;
         }
-        restore(dataset, &mut fitted)?;
+        dataset.restore(&fitted);
         let Some((next, all)) = all_together(dataset, &fitted, &steps)? else { break };
         (fitted, steps) = (next, all);
     }
-    restore(dataset, &mut fitted)?;
+    dataset.restore(&fitted);
     drop_weak(dataset, &mut fitted, &mut steps)?;
     look_again(dataset, &mut fitted, &mut steps)?;
     ask_every_run(dataset, &mut fitted, &mut steps)?;
@@ -79,19 +79,20 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Accepted]
         {
             *fitted = next;
             steps[own] = in_its_place(dataset, &fitted.fit, id, &steps[own]);
-            restore(dataset, fitted)?;
+            dataset.restore(fitted);
             continue;
         }
+        dataset.restore(fitted);
         let mut without = fitted.fit.hypothesis.clone();
         without.members.remove(at);
         let left = validated(dataset, fitted);
         let without = fit_with_ring_downs(dataset, &without)?;
-        match best_step(dataset, &without)? {
-            Some((next, step)) if step.origin == Origin::Discovered && validated(dataset, &next) <= left => {
+        match best_step(dataset, &without, |origin| origin == Origin::Discovered)? {
+            Some((next, step)) if validated(dataset, &next) <= left => {
                 *fitted = next;
                 steps[own] = step;
             }
-            _ => restore(dataset, fitted)?,
+            _ => dataset.restore(fitted),
         }
     }
     Ok(())
@@ -110,8 +111,12 @@ fn explains_as_well(dataset: &Dataset, fitted: &Fitted, other: &Fitted) -> bool 
     lead < LEAST_LEAD && validated(dataset, fitted) <= allowed * validated(dataset, other)
 }
 
-/// The best extension of a fitted hypothesis that earns its place.
-fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Accepted)>, Refusal> {
+/// The best extension of a fitted hypothesis that earns its place; none where it would come in with an origin that is not wanted.
+fn best_step(
+    dataset: &mut Dataset,
+    fitted: &Fitted,
+    wanted: impl Fn(Origin) -> bool,
+) -> Result<Option<(Fitted, Accepted)>, Refusal> {
     let before = on_fit(dataset, &fitted.fit);
     let dense =
         dataset.tracks.iter().any(|p| p.track.is_thinned()).then(|| {
@@ -133,12 +138,14 @@ fn best_step(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, A
     let before_it = Before::of(dataset, fitted);
     loop {
         amplitude_evidence(dataset, &mut trials, balance_before, apart);
-        let Some((chosen, origin, confounded_with)) = choose(&trials, apart) else { return Ok(None) };
+        let chosen = choose(&trials, apart).filter(|(_, origin, _)| wanted(*origin));
+        let Some((chosen, origin, confounded_with)) = chosen else { return Ok(None) };
         let chosen = chosen.clone();
         let next = fit_with_ring_downs(dataset, &extend_from(&chosen, origin))?;
         trials.retain(|t| t.candidate != chosen.candidate);
         if !before_it.is_improved_by(validated(dataset, &next)) {
             // gained where it was fitted only, or too little to name: the next one's turn
+            dataset.restore(fitted);
             continue;
         }
         let step = Accepted {
@@ -253,7 +260,7 @@ pub(super) fn drop_weak(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut 
                 let without = fit_with_ring_downs(dataset, &reduced)?;
                 if (1.0 - LEAST_VALIDATED_GAIN) * validated(dataset, &without) > before {
                     // weak by itself, but what it leaves where it was not fitted asks for it
-                    *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
+                    dataset.restore(fitted);
                     return Ok(());
                 }
                 *fitted = without;

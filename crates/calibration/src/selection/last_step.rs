@@ -2,6 +2,7 @@
 //! all that was fitted.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
@@ -11,7 +12,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::{Instrument, Role};
-use crate::selection::step::{Accepted, step_of};
+use crate::selection::step::{Accepted, member_of, step_of};
 use crate::selection::trial::LEAST_GAIN;
 use cvg_model::effects::Role as ParameterRole;
 
@@ -20,7 +21,7 @@ use cvg_model::effects::Role as ParameterRole;
 const WORSE: f64 = 1.1;
 
 /// Ends a fit: effects that its noise can make are dropped, the last step is made, and the covariance of the unknowns is
-/// what it leaves.
+/// what it leaves. An effect that may be nothing at all under that is no discovery: it corrects, and explains nothing.
 ///
 /// # Errors
 /// As for the fit.
@@ -29,6 +30,21 @@ pub(crate) fn last_step(
     fitted: &mut Fitted,
     steps: &mut Vec<Accepted>,
 ) -> Result<DMatrix<f64>, Refusal> {
+    let covariance = end(dataset, fitted, steps)?;
+    for own in 0..steps.len() {
+        let Some(at) = member_of(&fitted.fit.hypothesis, own, steps) else { continue };
+        let discovered = fitted.fit.hypothesis.members[at].origin == Origin::Discovered;
+        if discovered && may_be_nothing(&fitted.fit, &covariance, at) {
+            fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
+            steps[own].origin = Origin::Empirical;
+            steps[own].inconsistency = Some("its interval holds zero".into());
+        }
+    }
+    Ok(covariance)
+}
+
+/// The last step and the covariance after it.
+fn end(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut Vec<Accepted>) -> Result<DMatrix<f64>, Refusal> {
     if dataset.instrument == Instrument::Sensor {
         // the amplitude is part of a sensor's fit
         return Ok(of_blocks(dataset, &fitted.fit));
@@ -83,9 +99,23 @@ fn least_significant(refined: &Refined, steps: &[Accepted]) -> Option<(usize, us
         .map(|(_, at, step)| (at, step))
 }
 
-/// What a member gains in 2 ln likelihood over its absence (Wald 1943) under a covariance of the unknowns, less ln n for each of
-/// its parameters; `None` where none of them is fitted.
+/// What a member gains in 2 ln likelihood over its absence under a covariance of the unknowns, less ln n for each of its
+/// parameters; `None` where none of them is fitted.
 fn significance(fit: &Fit, covariance: &DMatrix<f64>, at: usize) -> Option<f64> {
+    let (wald, parameters) = wald(fit, covariance, at)?;
+    let n = (fit.counted[0] as f64).max(2.0);
+    Some(wald - parameters as f64 * n.ln())
+}
+
+/// Whether the 95 % interval of a member, or the ellipse of its parameters, holds its absence.
+fn may_be_nothing(fit: &Fit, covariance: &DMatrix<f64>, at: usize) -> bool {
+    let probability = |(wald, parameters): (f64, usize)| Some(ChiSquared::new(parameters as f64).ok()?.cdf(wald));
+    wald(fit, covariance, at).and_then(probability).is_some_and(|p| p < 0.95)
+}
+
+/// The distance of a member's parameters from its absence under a covariance of the unknowns (Wald 1943), χ² with as many degrees
+/// of freedom as the parameters that are returned beside it; `None` where none of them is fitted.
+fn wald(fit: &Fit, covariance: &DMatrix<f64>, at: usize) -> Option<(f64, usize)> {
     let member = &fit.hypothesis.members[at];
     let parameters = member.id.description().parameters;
     let own: Vec<(usize, f64)> = fit
@@ -105,8 +135,7 @@ fn significance(fit: &Fit, covariance: &DMatrix<f64>, at: usize) -> Option<f64> 
     }
     let block = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i].0, own[j].0)]);
     let value = DVector::from_iterator(own.len(), own.iter().map(|(_, v)| *v));
-    let n = (fit.counted[0] as f64).max(2.0);
-    Some(value.dot(&(scaled_inverse(&block, 0.0)? * &value)) - own.len() as f64 * n.ln())
+    Some((value.dot(&(scaled_inverse(&block, 0.0)? * &value)), own.len()))
 }
 
 /// Makes the last step, unless a run speaks against it: then the estimate stays, and by how much it would have moved counts as
@@ -185,4 +214,41 @@ fn undescribed(dataset: &Dataset, fit: &Fit) -> f64 {
         evaluate(&dataset.tracks, hypothesis, &fit.starts, Role::Fit, Window::Whole, None).mean_square()
     };
     (mean_square(&explained) / mean_square(&fit.hypothesis)).max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::fit::at_rest;
+    use cvg_model::effects::EffectId;
+
+    /// A skew of 0.01 that is known to `deviation`, and whether it may be nothing.
+    fn a_skew_may_be_nothing(deviation: f64) -> bool {
+        let mut hypothesis = Hypothesis::ideal(Instrument::Gyroscope, std::f64::consts::PI, 0.8);
+        let at = hypothesis.admit(EffectId::DetectionSkew, Origin::Discovered);
+        let unknowns = vec![Unknown::AngularGain, Unknown::Effect(at, 0)];
+        hypothesis.set(unknowns[1], 0.01);
+        let fit = at_rest(&[], &hypothesis, &unknowns);
+        let covariance = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, deviation * deviation]));
+        may_be_nothing(&fit, &covariance, at)
+    }
+
+    #[test]
+    fn an_effect_may_be_nothing_where_its_interval_holds_zero() {
+        assert!(a_skew_may_be_nothing(0.01 / 1.95));
+        assert!(!a_skew_may_be_nothing(0.01 / 1.97));
+    }
+
+    #[test]
+    fn of_two_parameters_their_ellipse_decides() {
+        let mut hypothesis = Hypothesis::ideal(Instrument::Gyroscope, std::f64::consts::PI, 0.8);
+        let at = hypothesis.admit(EffectId::Anisodamping, Origin::Discovered);
+        let unknowns: Vec<Unknown> = (0..2).map(|p| Unknown::Effect(at, p)).collect();
+        unknowns.iter().for_each(|u| hypothesis.set(*u, 1.9));
+        let fit = at_rest(&[], &hypothesis, &unknowns);
+        // neither axis leaves its interval, both together leave the ellipse of χ² = 5.99
+        assert!(!may_be_nothing(&fit, &DMatrix::identity(2, 2), at));
+        let along = DMatrix::from_row_slice(2, 2, &[1.0, 0.9, 0.9, 1.0]);
+        assert!(may_be_nothing(&fit, &along, at));
+    }
 }

@@ -68,6 +68,7 @@ pub(super) fn all_together(
 
 /// The declared model with every cause of at most `most` parameters, where that leaves noise.
 fn everything(dataset: &mut Dataset, fitted: &Fitted, most: usize) -> Result<Option<(Fitted, Vec<Accepted>)>, Refusal> {
+    dataset.restore(fitted);
     let mut declared = fitted.fit.hypothesis.clone();
     // what came in before stands for what was missing then
     declared.members.retain(|m| m.origin == Origin::Declared);

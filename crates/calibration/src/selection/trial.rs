@@ -5,11 +5,10 @@ use cvg_model::effects::{Role as ParameterRole, Stage};
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
 use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
-use crate::error::Refusal;
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::cross_validation::cross_validated;
 use crate::estimation::fit::{Effort, Fit, fit};
-use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
+use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
@@ -111,14 +110,6 @@ pub(super) fn price(candidate: &Candidate, n: f64) -> f64 {
 pub(super) fn sample_cost(evaluation: &Evaluation) -> f64 {
     let correlation = autocorrelation(evaluation, WHITENESS_LAGS);
     inflation(&correlation, evaluation.errors().count())
-}
-
-/// Trials leave the runs as their own fits had them: fits them again as they were.
-pub(super) fn restore(dataset: &mut Dataset, fitted: &mut Fitted) -> Result<(), Refusal> {
-    if dataset.disturbed(&fitted.fit) {
-        *fitted = fit_with_ring_downs(dataset, &fitted.fit.hypothesis)?;
-    }
-    Ok(())
 }
 
 /// What cross-validation left before a step, and how much of it has to go.
