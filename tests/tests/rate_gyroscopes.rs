@@ -440,3 +440,33 @@ fn a_run_across_is_refused_of_what_is_no_rate_gyroscope() {
         refusal.unwrap_err().to_string().starts_with("x.csv: a run across the input axis is one of a rate gyroscope")
     );
 }
+
+/// The angle of a pattern, read round the turn and stated to turn by 0.8 of it: a harmonic of the pattern was left in it as if the
+/// angle were the integral of a rate.
+#[test]
+fn an_angle_that_follows_a_share_of_the_turn_is_a_pattern() {
+    let mut noise = Noise::new(5);
+    let turn = |rate: f64, role, noise: &mut Noise| {
+        let t_s: Vec<f64> = (0..3000).map(|i| 0.02 * f64::from(i)).collect();
+        let theta = |t: &f64| {
+            let phi = -0.8 * rate * t;
+            phi + 0.3 * (2.0 * phi + 40.0).to_radians().sin() + 0.002 * noise.sample()
+        };
+        let theta_deg = Some(t_s.iter().map(theta).collect());
+        let rate_dps = Some(vec![rate; t_s.len()]);
+        run(&format!("{rate}.csv"), role, Recording { t_s, rate_dps, theta_deg, ..Recording::default() })
+    };
+    let runs = [(200.0, Role::Fit), (-150.0, Role::Fit), (300.0, Role::Holdout)];
+    let runs: Vec<Run> = runs.into_iter().map(|(rate, role)| turn(rate, role, &mut noise)).collect();
+    let with = |angular_gain| Campaign {
+        device: "made".into(),
+        instrument: Instrument::Gyroscope,
+        period_deg: Some(360.0),
+        angular_gain: Some(angular_gain),
+        runs: runs.clone(),
+        ..Campaign::default()
+    };
+    let i = identified(with(0.8));
+    assert!(held_out(&i) < 0.006, "{}° of 0.21°: {:#?}", held_out(&i), i.report.effects);
+    assert!(find(&i, "rate-offset").is_none());
+}

@@ -38,7 +38,11 @@ pub(crate) fn serves(campaign: &Campaign) -> bool {
     campaign.instrument == Instrument::Sensor || is_rate_gyroscope(campaign)
 }
 
-/// A gyroscope whose only output is an angle that goes round once a turn, turned about its input axis and perhaps others.
+/// The angular gain of the integral of a rate is its scale factor, which is 1 within this: that of a vibration's pattern is less.
+const SCALE_FACTOR: f64 = 0.05;
+
+/// A gyroscope whose only output is an angle that goes round once a turn, turned about its input axis and perhaps others; not one
+/// that is stated to follow a share of the turn, as a pattern does.
 pub(crate) fn is_rate_gyroscope(campaign: &Campaign) -> bool {
     let of_one = |run: &Run| {
         matches!(run.kind, RunKind::Rotation | RunKind::CrossAxis)
@@ -47,6 +51,7 @@ pub(crate) fn is_rate_gyroscope(campaign: &Campaign) -> bool {
     };
     campaign.instrument == Instrument::Gyroscope
         && campaign.period_deg == Some(360.0)
+        && campaign.angular_gain.is_none_or(|k| (k.abs() - 1.0).abs() < SCALE_FACTOR)
         && campaign.runs.iter().all(of_one)
         && campaign.runs.iter().any(|run| run.kind == RunKind::Rotation)
 }
@@ -300,6 +305,13 @@ fn sensor_finding(
     let own = own_gain_ratios(&model, &thinned).into_iter();
     let all = described.gain_ratio();
     let all = all.map(|all| covering(all, "detection gain ratio", own, CONTRADICTS, &mut warnings));
+    let (there, not_told) = model.where_asked(runs, held);
+    warnings.extend(not_told.into_iter().map(|[n, other]| {
+        format!(
+            "the line of {n} per turn may as well be one of {other}, which looks the same at the stations that were fitted, and is \
+             another at those held out: it is not taken off there"
+        )
+    }));
     let against = sense.is_some_and(|s| s * model.sensor.gain < 0.0);
     let gain_ratio = all.map(|ratio| if against { or_exchanged(ratio) } else { ratio });
     if against {
@@ -349,10 +361,7 @@ fn sensor_finding(
                 sensor.samples(&[run.as_recorded()], declared.as_ref()).iter().map(|s| s.error).collect()
             })
         },
-        discovered: Box::new({
-            let model = model.clone();
-            move |run| model.left(run)
-        }),
+        discovered: Box::new(move |run| there.left(run)),
         scale_factor: None,
         bias: None,
         alone: (!neutral).then(|| -> ByItself<'_> {

@@ -20,6 +20,11 @@ const OF_EVERY_TABLE: usize = 4;
 const ONE_LINE: f64 = 0.25;
 /// The strongest line may be the alias of one that has this share of its power, and this coherence with it on the stations.
 const ALIAS: f64 = 0.4;
+/// Lines of at least this coherence are one on the stations, and below the other they are two: engineering choices.
+const SAME: f64 = 0.9;
+const ANOTHER: f64 = 0.75;
+/// Multiples of the stations' number about which aliases of a line lie.
+const FOLDS: u32 = 3;
 /// Lines that are tried in its place, itself among them.
 const MOST_ALIASES: usize = 4;
 /// A usual distance of stations is at most so many times their spacing.
@@ -64,15 +69,42 @@ pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, c
         return Vec::new();
     }
     let first = ranked[0];
+    // stations of several runs at unlike places tell some of what each by itself does not resolve
+    let beyond = folded(first.0, &reference).filter(|n| f64::from(*n) > resolved && *n <= HIGHEST);
+    let beyond = beyond.filter(|n| coherence(first.0, *n, &reference) < SAME);
+    ranked.extend(beyond.map(|n| (n, power(f64::from(n), &reference, &left))));
     let aliases = ranked.into_iter().filter(|a| a.1 > ALIAS * first.1 && coherence(first.0, a.0, &reference) > ALIAS);
     aliases.take(MOST_ALIASES).map(|(n, _)| n).collect()
 }
 
 /// Coherence of two lines on the stations: 1 where one is the alias of the other, near 0 where both are resolved.
 fn coherence(a: u32, b: u32, reference: &[f64]) -> f64 {
+    beats(a, b, reference).into_iter().map(|[c, s]| c.hypot(s)).fold(0.0, f64::max)
+}
+
+/// Means of the cosine and the sine of the difference and of the sum of two lines over stations.
+fn beats(a: u32, b: u32, reference: &[f64]) -> [[f64; 2]; 2] {
     let (a, b) = (f64::from(a), f64::from(b));
-    let mean = |n: f64| power(n, reference, &vec![1.0; reference.len()]).sqrt() / reference.len() as f64;
-    mean(a - b).max(mean(a + b))
+    [a - b, a + b].map(|n| projections(n, reference, &vec![1.0; reference.len()]).map(|v| v / reference.len() as f64))
+}
+
+/// Lines that fold over to one of `n` per turn on stations at even distances.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive counts, saturating")]
+fn folded(n: u32, reference: &[f64]) -> impl Iterator<Item = u32> {
+    let stations = std::f64::consts::TAU / spacing(reference).max(1e-12);
+    let about = (1..=FOLDS).map(move |fold| f64::from(fold) * stations);
+    let all = about.flat_map(move |of| [of - f64::from(n), of + f64::from(n)]).map(|m| m.abs().round() as u32);
+    all.filter(move |m| *m > 0 && *m != n)
+}
+
+/// A line that looks like one of `n` per turn on the stations that were fitted, and is another where the angle is asked for: stations at
+/// even distances do not tell the two, and what is fitted of the one says nothing of the other's stations.
+pub(crate) fn alias_elsewhere(n: u32, fitted: &[f64], asked: &[f64]) -> Option<u32> {
+    folded(n, fitted).find(|m| {
+        let [here, there] = [fitted, asked].map(|reference| beats(n, *m, reference));
+        let over_both = |k: usize| (here[k][0] + there[k][0]).hypot(here[k][1] + there[k][1]) / 2.0;
+        (0..2).any(|k| here[k][0].hypot(here[k][1]) > SAME && over_both(k) < ANOTHER)
+    })
 }
 
 /// The step of which all distances between neighbouring stations are multiples. Where stations were left out, the lower
@@ -95,11 +127,15 @@ fn belongs_to_table(n: u32, order: usize, cycles_per_turn: f64) -> bool {
 }
 
 fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {
-    let (c, s) = reference.iter().zip(left).fold((0.0, 0.0), |(c, s), (a, e)| {
+    projections(n, reference, left).into_iter().map(|v| v * v).sum()
+}
+
+/// Sums of what is left times the cosine and the sine of a line.
+fn projections(n: f64, reference: &[f64], left: &[f64]) -> [f64; 2] {
+    reference.iter().zip(left).fold([0.0; 2], |[c, s], (a, e)| {
         let (sin, cos) = (n * a).sin_cos();
-        (c + e * cos, s + e * sin)
-    });
-    c * c + s * s
+        [c + e * cos, s + e * sin]
+    })
 }
 
 #[cfg(test)]
@@ -125,5 +161,19 @@ mod tests {
         let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![], free_gain: false };
         let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
         assert_eq!(strongest_and_its_aliases(&samples, &fitted, 1.0)[0], 36);
+    }
+
+    #[test]
+    fn a_line_is_another_elsewhere_where_even_stations_do_not_tell_it_from_its_alias() {
+        let stations = |from: f64| -> Vec<f64> { (0..72).map(|i| (from + 5.0 * f64::from(i)).to_radians()).collect() };
+        // 22 and 50 per turn are one on 72 stations, and each other's opposite half a step further
+        assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(2.5)), Some(50));
+        assert_eq!(alias_elsewhere(50, &stations(0.0), &stations(2.5)), Some(22));
+        assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(0.0)), None);
+        // a full step of the motor further it is the same again
+        assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(25.0)), None);
+        // a reference that turns meets every position
+        let turning: Vec<f64> = (0..5000).map(|i| 0.0123 * f64::from(i)).collect();
+        assert_eq!(alias_elsewhere(22, &turning, &stations(2.5)), None);
     }
 }

@@ -5,6 +5,7 @@ use cvg_model::effects::EffectId;
 use super::circle;
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
 use super::deviations::Deviations;
+use super::lines::alias_elsewhere;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, centre, fit};
@@ -209,6 +210,23 @@ impl SensorModel {
     /// The readout alone.
     pub(crate) fn front(&self) -> Option<&Readout> {
         self.readout.as_ref().map(|r| &r.0)
+    }
+
+    /// The model where the angle of `asked` is asked for, without the lines of the reference's turn that stations at even distances do
+    /// not tell from another there, each with that other.
+    pub(crate) fn where_asked(&self, fitted: &[SensorRun], asked: &[SensorRun]) -> (Self, Vec<[u32; 2]>) {
+        let positions =
+            |runs: &[SensorRun]| -> Vec<f64> { runs.iter().flat_map(|r| r.reference_rad.clone()).collect() };
+        let (fitted, asked) = (positions(fitted), positions(asked));
+        let mut there = self.clone();
+        let mut others = Vec::new();
+        for (at, &n) in self.table.shape.lines.iter().enumerate() {
+            if let Some(other) = alias_elsewhere(n, &fitted, &asked) {
+                there.table.without_line(at);
+                others.push([n, other]);
+            }
+        }
+        (there, others)
     }
 
     /// Error of a run with what was found undone, followed through its period, about its median.

@@ -31,6 +31,9 @@ const ORDER_BESIDE_LINES: usize = 12;
 /// Observations for each unknown, an engineering choice. A row observes the angle, and of two channels the radius too: 27
 /// stations allow a table of four harmonics, and eight a readout's offset, gain and skew.
 const OBSERVATIONS_PER_UNKNOWN: usize = 3;
+/// Stations for each coefficient of a table, an engineering choice: fewer than twice as many leave cross-validation no place between them
+/// to look at. 24 stations allow five harmonics of the twelve that they resolve.
+const STATIONS_PER_UNKNOWN: usize = 2;
 /// And of a readout and a table together: the table lives in the angle, and the readout in both. 27 stations allow offset,
 /// gain and skew beside four harmonics.
 const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
@@ -370,7 +373,7 @@ fn stations(sensor: &Sensor, runs: &[SensorRun]) -> usize {
 /// Whether stations carry a table: a harmonic at or beyond half of them is zero at each, or one of the others, and rows that repeat a
 /// station say nothing more of it.
 fn stations_carry(stations: usize, order: usize) -> bool {
-    order == 0 || (2 * order + 1) * OBSERVATIONS_PER_UNKNOWN <= stations
+    order == 0 || (2 * order + 1) * STATIONS_PER_UNKNOWN <= stations
 }
 
 /// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.

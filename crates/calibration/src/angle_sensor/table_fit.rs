@@ -198,6 +198,12 @@ impl TableFit {
         sound.then_some(fitted)
     }
 
+    /// Takes a line for nothing.
+    pub(crate) fn without_line(&mut self, at: usize) {
+        let first = self.shape.side() - 2 * (self.shape.lines.len() - at);
+        self.side[first..first + 2].fill(0.0);
+    }
+
     /// Error of the compensated angle; the run's constant is not taken out.
     pub(crate) fn left(&self, s: &Sample) -> f64 {
         let mut sides = Vec::with_capacity(self.side.len());

@@ -106,7 +106,20 @@ impl Inference<'_> {
     }
 
     fn deviation(&self, unknown: Unknown) -> f64 {
-        self.index(unknown).map_or(0.0, |i| self.covariance[(i, i)].max(0.0).sqrt())
+        let Some(i) = self.index(unknown) else { return 0.0 };
+        self.covariance[(i, i)].max(0.0).sqrt().hypot(self.by_damping(unknown))
+    }
+
+    /// What a fault of the drives could be by as much damping as nobody knows, where their commands were not recorded: what they do
+    /// is the damping that they replace times the fault, and two faults that nearly cancel narrow it by their product alone.
+    fn by_damping(&self, unknown: Unknown) -> f64 {
+        let (Unknown::Effect(at, p), Some(damping)) = (unknown, self.index(Unknown::Damping)) else { return 0.0 };
+        let member = &self.hypothesis().members[at];
+        if member.id.description().stage != Stage::Actuation {
+            return 0.0;
+        }
+        let unknown_share = self.covariance[(damping, damping)].max(0.0).sqrt() / self.hypothesis().damping_per_s;
+        (unknown_share * (member.values[p] - member.id.neutral::<f64>()[p])).abs()
     }
 
     fn estimate(&self, unknown: Unknown) -> Estimate {
