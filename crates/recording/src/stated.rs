@@ -20,7 +20,10 @@ impl Recording {
     /// The unit of each of these columns, `-` where none is known, if one of them has to be stated.
     pub(crate) fn stated_units(&self, outlets: &[(&str, Outlet<'_>)]) -> Option<Vec<&str>> {
         let has_to_be = |(name, outlet): &(&str, Outlet<'_>)| is_taken_for_another(name, outlet);
-        let is_stated = self.readout_unit.is_some() || outlets.iter().any(has_to_be);
+        let is_of_the_readout =
+            |name: &str| matches!(channel(name), Some(Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys));
+        let readout = self.readout_unit.is_some() && outlets.iter().any(|(name, _)| is_of_the_readout(name));
+        let is_stated = readout || outlets.iter().any(has_to_be);
         is_stated.then(|| outlets.iter().map(|(name, _)| self.unit(name)).collect())
     }
 

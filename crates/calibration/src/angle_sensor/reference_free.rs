@@ -77,7 +77,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
     let mut warnings = Vec::new();
-    let runs = without_spikes(runs.collect::<Result<_, _>>()?, &mut warnings);
+    let runs = without_spikes(runs.collect::<Result<_, _>>()?, std::f64::consts::TAU, &mut warnings);
     let (fitted, held) = apart(of_one_sensor(runs, &mut warnings)?)?;
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {

@@ -47,7 +47,7 @@ pub(crate) fn believed(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<SensorRun>, Refusal> {
     let runs = without_interpolated_rows(without_copied_rows(runs, warnings)?, warnings);
-    let runs = without_spikes(runs, warnings);
+    let runs = without_spikes(runs, period, warnings);
     let runs = of_one_sensor(runs, warnings)?;
     let follows: Vec<Follows> = runs.iter().map(|r| follows(r, stated, period)).collect();
     let mut told: Vec<f64> =

@@ -20,6 +20,7 @@ use super::sensor::Sensor;
 use super::table_fit::{Motion, Sample, Shape, TableFit};
 use crate::model::angle_table::Form;
 use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::median;
 
 /// Lengths of the table that are offered: nested, so that the order of trial has no say.
 pub(crate) const ORDERS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32];
@@ -31,9 +32,9 @@ const ORDER_BESIDE_LINES: usize = 12;
 /// Observations for each unknown, an engineering choice. A row observes the angle, and of two channels the radius too: 27
 /// stations allow a table of four harmonics, and eight a readout's offset, gain and skew.
 const OBSERVATIONS_PER_UNKNOWN: usize = 3;
-/// Stations for each coefficient of a table, an engineering choice: fewer than twice as many leave cross-validation no place between them
-/// to look at. 24 stations allow five harmonics of the twelve that they resolve.
-const STATIONS_PER_UNKNOWN: usize = 2;
+/// Stations for each coefficient of a table and its constant, an engineering choice: a few more than would be met exactly. 12 stations
+/// allow four harmonics of the six that they resolve.
+const STATIONS_PER_UNKNOWN: f64 = 1.3;
 /// And of a readout and a table together: the table lives in the angle, and the readout in both. 27 stations allow offset,
 /// gain and skew beside four harmonics.
 const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
@@ -45,6 +46,9 @@ const FINALISTS: usize = 3;
 const MOST_LINES: usize = 6;
 /// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
 pub(crate) const VARYING_RATE: f64 = 0.02;
+/// Speeds that differ by less than this share are one, where no more than this share of the rows has another: engineering choices.
+const ONE_SPEED: f64 = 0.1;
+const WHERE_IT_TURNS_BACK: f64 = 0.15;
 /// A motion of which less than this share, in power, is no function of the position is not told from it.
 const LEAST_OF_ITS_OWN: f64 = 1e-2;
 
@@ -219,11 +223,26 @@ impl<'a> Selection<'a> {
         if both {
             all.push(Motion::Direction);
         }
+        // at one speed a lag is a constant that changes sign with the direction, and rows at which it turns back do not tell the two
+        if both && self.turns_at_one_speed(&rates) {
+            return self.motion_among(front, &all);
+        }
         all.push(Motion::Rate);
         if self.is_told_from_position(|s| s.acceleration) {
             all.push(Motion::RateAndAcceleration);
         }
-        let trial = self.offer(std::slice::from_ref(front), &self.shapes(&MOTION_ORDERS, &all, &[]));
+        self.motion_among(front, &all)
+    }
+
+    /// Whether the speed is one but where it turns back.
+    fn turns_at_one_speed(&self, rates: &[f64]) -> bool {
+        let usual = median(&mut rates.iter().map(|r| r.abs()).collect::<Vec<_>>());
+        let others = rates.iter().filter(|r| (r.abs() / usual - 1.0).abs() > ONE_SPEED).count();
+        (others as f64) < WHERE_IT_TURNS_BACK * rates.len() as f64
+    }
+
+    fn motion_among(&mut self, front: &Option<Front>, all: &[Motion]) -> Vec<Motion> {
+        let trial = self.offer(std::slice::from_ref(front), &self.shapes(&MOTION_ORDERS, all, &[]));
         match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
             Some(motion) => vec![Motion::None, motion],
@@ -373,7 +392,7 @@ fn stations(sensor: &Sensor, runs: &[SensorRun]) -> usize {
 /// Whether stations carry a table: a harmonic at or beyond half of them is zero at each, or one of the others, and rows that repeat a
 /// station say nothing more of it.
 fn stations_carry(stations: usize, order: usize) -> bool {
-    order == 0 || (2 * order + 1) * STATIONS_PER_UNKNOWN <= stations
+    order == 0 || (2 * order + 1) as f64 * STATIONS_PER_UNKNOWN <= stations as f64
 }
 
 /// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.

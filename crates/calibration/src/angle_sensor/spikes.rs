@@ -1,4 +1,5 @@
-//! Damaged rows of two channels: a bit that flipped, a sample that a spark hit. Points of one sensor draw one closed curve, and
+//! Damaged rows: a bit that flipped, a sample that a spark hit. An angle that is off its reference for a row leaps, while those beside
+//! it, in time and in position, do not. Of two channels the points of one sensor draw one closed curve, and
 //! a damaged one lies beside it while those before and after, in time and in position, do not.
 //!
 //! The ellipse that tells is that of the median: of ellipses through a few points each, the one from which half of all rows are
@@ -10,7 +11,7 @@ use std::f64::consts::TAU;
 use super::ellipse::through;
 use super::rails::Rails;
 use super::readout::Readout;
-use super::samples::SensorRun;
+use super::samples::{Reading, SensorRun};
 use crate::data::plausibility::{MOST_LOST, places, stretches};
 use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::statistics::{line, median, robust_deviation, span};
@@ -32,6 +33,8 @@ const LEAST: f64 = 0.02;
 /// An angle leaps by this at least, rad: what is mirrored at an axis is off by twice the spike, and an error that begins to last grows by
 /// less from row to row.
 const LEAST_LEAP: f64 = 0.05;
+/// … and of a sensor that reads an angle by this: what is finer than a digit of it is no damage.
+const LEAST_LEAP_OF_AN_ANGLE: f64 = 1e-3;
 /// Rounds in which rows are left out.
 const ROUNDS: usize = 4;
 /// Rows on either side, in time and in position, that are compared with it.
@@ -43,17 +46,22 @@ const SOUND: f64 = 0.3;
 const LARGEST_STEP: f64 = 0.125 * TAU;
 
 /// The runs without damaged rows. Says of which.
-pub(super) fn without_spikes(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Vec<SensorRun> {
+pub(super) fn without_spikes(runs: Vec<SensorRun>, period: f64, warnings: &mut Vec<String>) -> Vec<SensorRun> {
     let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
     let sound = |run: SensorRun| {
-        let damaged = in_rounds(&run, &rails);
+        let damaged = in_rounds(&run, &rails, period);
         let count = damaged.iter().filter(|is| **is).count();
         if count == 0 || count as f64 > MOST_LOST * run.len() as f64 {
             return run;
         }
+        let what = match run.reading {
+            Reading::Channels(_) => {
+                "lie off the ellipse that the others draw, or on it where those beside them are not"
+            }
+            Reading::Angle(_) => "are off their reference where those beside them are not",
+        };
         warnings.push(format!(
-            "{}: {count} rows lie off the ellipse that the others draw, or on it where those beside them are not, each by itself: {}; they \
-             are damaged and left out",
+            "{}: {count} rows {what}, each by itself: {}; they are damaged and left out",
             run.name,
             places(&run.t_s, &stretches(run.len(), |i| damaged[i]))
         ));
@@ -63,11 +71,15 @@ pub(super) fn without_spikes(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -
 }
 
 /// The damaged rows; some are alone only where others are out of the way.
-fn in_rounds(run: &SensorRun, rails: &Rails) -> Vec<bool> {
+fn in_rounds(run: &SensorRun, rails: &Rails, period: f64) -> Vec<bool> {
     let mut out = vec![false; run.len()];
     for _ in 0..ROUNDS {
         let kept: Vec<usize> = (0..run.len()).filter(|i| !out[*i]).collect();
-        let found = damaged_rows(&run.subset(&kept), rails);
+        let left = run.subset(&kept);
+        let found = match &left.reading {
+            Reading::Channels(channels) => damaged_points(&left, channels, rails),
+            Reading::Angle(theta) => damaged_angles(&left, theta, period),
+        };
         if !found.contains(&true) {
             break;
         }
@@ -76,10 +88,10 @@ fn in_rounds(run: &SensorRun, rails: &Rails) -> Vec<bool> {
     out
 }
 
-fn damaged_rows(run: &SensorRun, rails: &Rails) -> Vec<bool> {
+fn damaged_points(run: &SensorRun, channels: &[[f64; 2]], rails: &Rails) -> Vec<bool> {
     let rows = run.len();
-    let found = run.channels().filter(|_| rows >= FEWEST_ROWS).and_then(|v| Some((v, usual_ellipse(v)?)));
-    let Some((channels, ellipse)) = found else { return vec![false; rows] };
+    let ellipse = if rows >= FEWEST_ROWS { usual_ellipse(channels) } else { None };
+    let Some(ellipse) = ellipse else { return vec![false; rows] };
     let off: Vec<f64> = channels.iter().map(|z| distance(&ellipse, *z)).collect();
     let is_whole = |i: &usize| !rails.clips(channels[*i]);
     let far: Vec<usize> = beyond_usual(&off).into_iter().filter(is_whole).collect();
@@ -90,6 +102,17 @@ fn damaged_rows(run: &SensorRun, rails: &Rails) -> Vec<bool> {
     for row in leaps(run, channels, &ellipse, &damaged) {
         damaged[row] = true;
     }
+    damaged
+}
+
+fn damaged_angles(run: &SensorRun, theta: &[f64], period: f64) -> Vec<bool> {
+    let mut damaged = vec![false; run.len()];
+    let off = if run.len() >= FEWEST_ROWS { leap_of_each(theta, &run.reference_rad, period) } else { None };
+    let Some((off, error)) = off else { return damaged };
+    let noise = robust_deviation(error.windows(2).map(|w| w[1] - w[0])) / std::f64::consts::SQRT_2;
+    let least = (OFF * noise.max(robust_deviation(off.iter().copied()))).max(LEAST_LEAP_OF_AN_ANGLE);
+    let far: Vec<usize> = (0..off.len()).filter(|i| off[*i] > least).collect();
+    alone(&off, &run.reference_rad, &far).into_iter().for_each(|row| damaged[row] = true);
     damaged
 }
 
@@ -122,21 +145,28 @@ fn alone(off: &[f64], reference_rad: &[f64], far: &[usize]) -> Vec<usize> {
 fn leaps(run: &SensorRun, channels: &[[f64; 2]], ellipse: &Readout, damaged: &[bool]) -> Vec<usize> {
     let rows: Vec<usize> = (0..run.len()).filter(|i| !damaged[*i]).collect();
     let reference: Vec<f64> = rows.iter().map(|i| run.reference_rad[*i]).collect();
-    if span(&reference) <= 0.0 {
-        return Vec::new();
-    }
-    let theta = unwrapped(rows.iter().map(|i| ellipse.angle(channels[*i])), TAU);
-    let (gain, _) = line(&reference, &theta);
-    let mut steps: Vec<f64> = reference.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
-    if median(&mut steps) > LARGEST_STEP {
-        return Vec::new();
-    }
-    let error: Vec<f64> = theta.iter().zip(&reference).map(|(t, a)| t - gain * a).collect();
-    let leap =
-        |i: usize| beside(i, rows.len()).map(|j| wrapped(error[i] - error[j], TAU).abs()).fold(f64::INFINITY, f64::min);
-    let off: Vec<f64> = (0..rows.len()).map(leap).collect();
+    let theta: Vec<f64> = rows.iter().map(|i| ellipse.angle(channels[*i])).collect();
+    let Some((off, _)) = leap_of_each(&theta, &reference, TAU) else { return Vec::new() };
     let far: Vec<usize> = beyond_usual(&off).into_iter().filter(|i| off[*i] > LEAST_LEAP).collect();
     alone(&off, &reference, &far).into_iter().map(|i| rows[i]).collect()
+}
+
+/// By how much the angle of each row is off that row beside it whose angle goes best with its own, and what it is off its reference;
+/// `None` where the reference stands still, or goes on in steps so large that it does not tell where an angle is.
+fn leap_of_each(theta: &[f64], reference: &[f64], period: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    if span(reference) <= 0.0 {
+        return None;
+    }
+    let theta = unwrapped(theta.iter().copied(), period);
+    let (gain, _) = line(reference, &theta);
+    let mut steps: Vec<f64> = reference.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
+    if median(&mut steps) > LARGEST_STEP * period / TAU {
+        return None;
+    }
+    let error: Vec<f64> = theta.iter().zip(reference).map(|(t, a)| t - gain * a).collect();
+    let apart = |i: usize, j: usize| wrapped(error[i] - error[j], period).abs();
+    let leap = |i: usize| beside(i, error.len()).map(|j| apart(i, j)).fold(f64::INFINITY, f64::min);
+    Some(((0..error.len()).map(leap).collect(), error))
 }
 
 /// The rows on either side of one.
@@ -174,7 +204,6 @@ fn distance(ellipse: &Readout, z: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::Reading;
     use super::*;
     use crate::numerics::statistics::remembered;
     use crate::recording::Role;
@@ -208,7 +237,7 @@ mod tests {
 
     fn left(run: &SensorRun) -> (usize, Vec<String>) {
         let mut warnings = Vec::new();
-        let left = without_spikes(vec![run.clone()], &mut warnings);
+        let left = without_spikes(vec![run.clone()], TAU, &mut warnings);
         (run.len() - left[0].len(), warnings)
     }
 
@@ -237,6 +266,25 @@ mod tests {
         let planted = (0..2000).filter(|i| is_hit(*i)).count();
         let (lost, _) = left(&spiked);
         assert!((150..250).contains(&planted) && lost.abs_diff(planted) <= 2, "{lost} of {planted}");
+    }
+
+    /// An encoder at the stations of one turn, with harmonics, a line of the motor at half their number, and noise.
+    #[test]
+    fn an_angle_that_is_off_for_a_row_is_left_out_and_its_errors_are_not() {
+        let noise = remembered(0.0, 201, 5);
+        let at = |i: usize| TAU * i as f64 / 200.0;
+        let error = |i: usize| 0.02 * at(i).sin() + 4e-3 * (4.0 * at(i)).cos() + 4e-4 * (100.0 * at(i)).cos();
+        let of = |hit: &[usize]| {
+            let mut encoder = run(201, |_, a| ellipse(a));
+            encoder.reference_rad = (0..201).map(at).collect();
+            let spike = |i: usize| if hit.contains(&i) { 0.05 } else { 0.0 };
+            let theta = (0..201).map(|i| (at(i) + error(i) + spike(i) + 3e-4 * noise[i]).rem_euclid(TAU));
+            encoder.reading = Reading::Angle(theta.collect());
+            encoder
+        };
+        assert_eq!(left(&of(&[])), (0, vec![]));
+        let (lost, warnings) = left(&of(&[17, 90, 160]));
+        assert!(lost == 3 && warnings[0].contains("off their reference"), "{lost}: {warnings:?}");
     }
 
     #[test]

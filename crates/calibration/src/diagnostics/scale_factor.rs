@@ -5,16 +5,18 @@
 //! A bias b that all runs share looks like a gain at a steady rate; nothing is known of it but that it is of the order of
 //! the Earth's rate.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
-use crate::estimation::fit::{Effort, fit};
+use crate::estimation::fit::{Effort, Fit, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted};
+use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Residual, Window, residuals};
 use crate::facts::{Estimate, ScaleFactor};
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::robust_deviation;
 use crate::recording::Role;
+use crate::selection::last_step::of_blocks;
 
 /// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
 const BIAS_DPS: f64 = 0.004_2;
@@ -36,12 +38,40 @@ const SPIKE: f64 = 6.0;
 /// Unknowns of a run: the gain's deviation, second and fourth harmonic of the angle, which a run leaves off in the middle.
 const UNKNOWNS: usize = 5;
 
-/// Rate, deg/s, and angular gain of each run, where their rates are such as tell a scale factor. Every run drifts by itself in
-/// a fit of its own: a gain that goes with the rate would else be taken for what the drive does.
-pub(crate) fn gains(dataset: &mut Dataset, fitted: &Fitted) -> Vec<(f64, Estimate)> {
-    if range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees())).is_none() {
-        return Vec::new();
+/// Nonlinearity and asymmetry of the scale factor, where the runs' rates are such as tell them. What the fit leaves open of the
+/// mechanics and the readout moves the gains of slow runs by more than those of fast ones: the intervals allow for it, by the covariance of
+/// the unknowns.
+pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<ScaleFactor> {
+    range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees()))?;
+    let (free, covariance) = with_drifts(dataset, fitted);
+    let of = |h: &Hypothesis| scale_factor(&gains(dataset, h, &free.starts), 0.0);
+    let nominal = of(&free.hypothesis)?;
+    let deviations: DVector<f64> = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    let correlation = DMatrix::from_fn(deviations.len(), deviations.len(), |i, j| {
+        let scale = deviations[i] * deviations[j];
+        if scale > 0.0 { covariance[(i, j)] / scale } else { 0.0 }
+    });
+    let axes = correlation.symmetric_eigen();
+    let mut squares = [0.0; 2];
+    for (value, axis) in axes.eigenvalues.iter().zip(axes.eigenvectors.column_iter()) {
+        let mut moved = free.hypothesis.clone();
+        for (i, unknown) in free.unknowns.iter().enumerate().filter(|(_, u)| **u != Unknown::AngularGain) {
+            moved.set(*unknown, moved.get(*unknown) + value.max(0.0).sqrt() * deviations[i] * axis[i]);
+        }
+        let Some(other) = of(&moved) else { continue };
+        squares[0] += (other.nonlinearity_ppm.value - nominal.nonlinearity_ppm.value).powi(2);
+        squares[1] += (other.asymmetry_ppm.value - nominal.asymmetry_ppm.value).powi(2);
     }
+    let wider = |e: Estimate, square: f64| e.widened(e.half_width().hypot(1.96 * square.sqrt()) - e.half_width());
+    Some(ScaleFactor {
+        nonlinearity_ppm: wider(nominal.nonlinearity_ppm, squares[0]),
+        asymmetry_ppm: wider(nominal.asymmetry_ppm, squares[1]),
+    })
+}
+
+/// The fit in which every run drifts by itself: a gain that goes with the rate would else be taken for what the drive does. The drifts
+/// are then forgotten, so that they are in the gains. With the covariance of its unknowns.
+fn with_drifts(dataset: &mut Dataset, fitted: &Fitted) -> (Fit, DMatrix<f64>) {
     let priors = dataset.priors(&fitted.fit.hypothesis, fitted.drive.as_ref());
     let balance = dataset.energy_balance;
     let drifted: Vec<bool> = dataset.tracks.iter().map(|t| t.drifts).collect();
@@ -55,11 +85,17 @@ pub(crate) fn gains(dataset: &mut Dataset, fitted: &Fitted) -> Vec<(f64, Estimat
     let of_the_drive = |u: &Unknown| matches!(u, Unknown::ForceScale | Unknown::ControlLatency);
     let unknowns: Vec<Unknown> = fitted.fit.unknowns.iter().copied().filter(|u| !of_the_drive(u)).collect();
     let mut free = fit(&dataset.tracks, &hypothesis, &unknowns, &priors, Role::Fit, Effort::FULL);
+    let covariance = of_blocks(dataset, &free);
     free.starts.iter_mut().flatten().for_each(|start| start.drift = 0.0);
-    let segments = residuals(&dataset.tracks, &free.hypothesis, &free.starts, Role::Fit, Window::Whole);
     dataset.tracks.iter_mut().zip(drifted).for_each(|(t, drifts)| t.drifts = drifts);
     dataset.energy_balance = balance;
-    let (k, sense) = (free.hypothesis.angular_gain, free.hypothesis.sense());
+    (free, covariance)
+}
+
+/// Rate, deg/s, and angular gain of each run.
+fn gains(dataset: &Dataset, hypothesis: &Hypothesis, starts: &[Vec<Start>]) -> Vec<(f64, Estimate)> {
+    let segments = residuals(&dataset.tracks, hypothesis, starts, Role::Fit, Window::Whole);
+    let (k, sense) = (hypothesis.angular_gain, hypothesis.sense());
     let told = dataset.tracks.iter().zip(segments).filter_map(|(track, segments)| {
         let (slope, deviation) = slope(&segments)?;
         let (value, half) = (k + sense * slope, (STUDENT_9 * deviation).hypot(1.96 * DRIVE * k));

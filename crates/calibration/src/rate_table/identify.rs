@@ -2,7 +2,7 @@
 //! and what is left.
 
 use crate::diagnostics::drives::clipping;
-use crate::diagnostics::scale_factor::{gains, scale_factor};
+use crate::diagnostics::scale_factor::scale_factor_of;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, declared_hypothesis, fit_with_ring_downs};
 use crate::identified::{Identification, Options};
@@ -60,7 +60,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
-    let scale_factor = scale_factor(&gains(&mut dataset, &fitted), 0.0);
+    let scale_factor = scale_factor_of(&mut dataset, &fitted);
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let steps = steps.into_iter().map(|step| step.read(&dataset)).collect();

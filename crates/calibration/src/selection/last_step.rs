@@ -189,7 +189,7 @@ fn doubted(fit: &Fit, steps: &[Accepted], mut covariance: DMatrix<f64>) -> DMatr
 
 /// Covariance without a last step: the larger of that of white residuals and of the block covariance, which allows for
 /// their memory. Where the loops' commands were not recorded, what is described and not explained counts as error.
-fn of_blocks(dataset: &Dataset, fit: &Fit) -> DMatrix<f64> {
+pub(crate) fn of_blocks(dataset: &Dataset, fit: &Fit) -> DMatrix<f64> {
     let dof = (fit.counted[0] + fit.counted[1]).saturating_sub(fit.unknowns.len()).max(1) as f64;
     let scale = (fit.left() / dof).max(f64::MIN_POSITIVE);
     // what considered unknowns could be does not depend on what is left

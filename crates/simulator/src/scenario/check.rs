@@ -11,6 +11,8 @@ const MOST_ROWS: f64 = 2e7;
 
 /// Magnitudes of an angular gain, as a campaign may state it: that of a gyroscope, or the periods a turn of an encoder.
 const POSSIBLE_GAIN: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// No rate table and no spindle turns faster, deg/s: ten times 17,000 turns a minute.
+const LARGEST_RATE_DPS: f64 = 1e6;
 /// A gain that wanders further would change its sign.
 const LARGEST_WANDER: f64 = 0.03;
 
@@ -147,7 +149,7 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
         }
         match run {
             Run::Rotation { rate_dps, settle_s, start_deg, .. } => {
-                finite(&field("rate_dps"), *rate_dps)?;
+                possible_rate(&field("rate_dps"), *rate_dps)?;
                 not_negative(&field("settle_s"), *settle_s)?;
                 finite(&field("start_deg"), start_deg.unwrap_or(0.0))?;
             }
@@ -166,7 +168,7 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
                     return Err(ScenarioError::invalid(field("kind"), "a sensor has nothing that rings"));
                 }
                 finite(&field("start_deg"), *start_deg)?;
-                finite(&field("rate_dps"), *rate_dps)?;
+                possible_rate(&field("rate_dps"), *rate_dps)?;
                 if !(-1.0..=1.0).contains(quadrature) {
                     return Err(ScenarioError::invalid(
                         field("quadrature"),
@@ -179,11 +181,12 @@ fn runs(s: &Settings) -> Result<(), ScenarioError> {
                     return Err(ScenarioError::invalid(field("kind"), "a sensor has nothing that precesses"));
                 }
                 not_negative(&field("virtual_dps"), *virtual_dps)?;
+                possible_rate(&field("virtual_dps"), *virtual_dps)?;
                 positive(&field("reversal_s"), *reversal_s)?;
                 not_negative(&field("settle_s"), *settle_s)?;
                 for [from_s, rate_dps] in turned {
                     not_negative(&field("turned"), *from_s)?;
-                    finite(&field("turned"), *rate_dps)?;
+                    possible_rate(&field("turned"), *rate_dps)?;
                 }
                 if !turned.is_sorted_by(|a, b| a[0] < b[0]) {
                     return Err(ScenarioError::invalid(field("turned"), "has to be in the order of time"));
@@ -215,6 +218,17 @@ fn finite(field: &str, value: f64) -> Result<(), ScenarioError> {
     } else {
         Err(ScenarioError::invalid(field, format!("{value} is not a finite number")))
     }
+}
+
+fn possible_rate(field: &str, value: f64) -> Result<(), ScenarioError> {
+    finite(field, value)?;
+    if value.abs() > LARGEST_RATE_DPS {
+        return Err(ScenarioError::invalid(
+            field,
+            format!("{value} deg/s is no rate: the largest is {LARGEST_RATE_DPS}"),
+        ));
+    }
+    Ok(())
 }
 
 fn positive(field: &str, value: f64) -> Result<(), ScenarioError> {
