@@ -365,6 +365,29 @@ fn twelve_stations_carry_four_harmonics() {
     }
 }
 
+/// One run of another encoder among three and among five: a model of all of three is as far off one as the other, and found nothing.
+#[test]
+fn a_run_of_another_encoder_is_left_out() {
+    for (runs, seed) in [(3, 1), (5, 2)] {
+        let mut noise = Noise::new(seed);
+        let mut at = |foreign: bool, role| {
+            let phase = if foreign { 130.0 } else { 20.0 };
+            let theta = |degrees: f64| {
+                let error = |n: u32| 0.2 / f64::from(n) * (f64::from(n) * degrees + phase).to_radians().sin();
+                degrees + error(1) + error(2) + 0.02 * noise.sample()
+            };
+            let mut run = angle_at((0..100).map(|i| 3.6 * f64::from(i)).collect(), theta, role);
+            run.file = if foreign { "foreign.csv" } else { "own.csv" }.into();
+            run
+        };
+        let fitted = (0..runs).map(|i| at(i == 1, Role::Fit)).collect::<Vec<_>>();
+        let i = identified(sensor(fitted.into_iter().chain([at(false, Role::Holdout)]).collect()));
+        assert!(held_out(&i) < 1.3 * 0.02, "{runs}: {}° left of 0.02° noise", held_out(&i));
+        let named = i.report.warnings.iter().filter(|w| w.contains("left out")).collect::<Vec<_>>();
+        assert!(named.len() == 1 && named[0].starts_with("foreign.csv"), "{runs}: {named:?}");
+    }
+}
+
 /// Two channels at evenly spaced stations of one turn, of which every third is held out: a gain ratio of 1.166, and
 /// `fourth` deg at four a turn.
 fn every_third_held(stations: u32, held: bool, fourth: f64, noise_v: f64, seed: u64) -> Run {

@@ -121,9 +121,14 @@ fn spacing(reference: &[f64]) -> f64 {
 
 /// Whether a line is a harmonic of the sensor's period that a table of so many harmonics holds, or could.
 fn belongs_to_table(n: u32, order: usize, cycles_per_turn: f64) -> bool {
+    is_harmonic_of_table(n, order.max(OF_EVERY_TABLE), cycles_per_turn)
+}
+
+/// Whether a line is a harmonic of the sensor's period that a table of so many harmonics holds.
+pub(crate) fn is_harmonic_of_table(n: u32, order: usize, cycles_per_turn: f64) -> bool {
     let harmonic = (f64::from(n) / cycles_per_turn).round();
     let apart = (f64::from(n) - harmonic * cycles_per_turn).abs();
-    harmonic >= 1.0 && apart < ONE_LINE && harmonic <= order.max(OF_EVERY_TABLE) as f64
+    harmonic >= 1.0 && apart < ONE_LINE && harmonic <= order as f64
 }
 
 fn power(n: f64, reference: &[f64], left: &[f64]) -> f64 {

@@ -13,6 +13,8 @@ const FEWEST_RUNS: usize = 3;
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
 /// A run that leaves so many times what the others do is looked at …
 const SUSPECT: f64 = 1.5;
+/// … and each of no more runs than this, where they read an angle …
+const FEW: usize = 5;
 /// … and is odd where the model of the others leaves this many times as much of it as of the worst of them: engineering choice.
 const ODD: f64 = 5.0;
 /// A cause is named where it is most of what is left: without it less than this share remains, rms.
@@ -33,31 +35,71 @@ pub(super) fn without_odd_runs(
     let most = (MOST_LEFT_OUT * runs.len() as f64).floor();
     let mut left_out = 0.0;
     while runs.len() >= FEWEST_RUNS && left_out < most && !model.by_radius {
-        let left: Vec<f64> = runs.iter().map(|r| root_mean_square(&model.left(r))).collect();
-        let Some(worst) = (0..runs.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { break };
-        let rest: Vec<SensorRun> =
-            runs.iter().enumerate().filter(|(i, _)| *i != worst).map(|(_, run)| run.clone()).collect();
-        let mut others: Vec<f64> = (0..runs.len()).filter(|i| *i != worst).map(|i| left[i]).collect();
-        if left[worst] <= SUSPECT * median(&mut others) {
+        let suspects = suspects(&runs, &model);
+        let tried = suspects.into_iter().filter_map(|at| without(&runs, at, &identify));
+        let Some(found) = tried.max_by(|a, b| a.apart().total_cmp(&b.apart())).filter(|found| found.apart() > ODD)
+        else {
             break;
-        }
-        let Ok(of_rest) = identify(&rest) else { break };
-        let own = root_mean_square(&of_rest.left(&runs[worst]));
-        let theirs = rest.iter().map(|r| root_mean_square(&of_rest.left(r))).fold(0.0, f64::max);
-        if own <= ODD * theirs {
-            break;
-        }
+        };
         warnings.push(format!(
             "{}: left out: with what the other runs show undone its angle is off by {:.4}°, theirs by {:.4}° at most{}",
-            runs[worst].name,
-            own.to_degrees(),
-            theirs.to_degrees(),
-            cause(&of_rest, &runs[worst], &rest).map_or(String::new(), |cause| format!("; {cause}"))
+            runs[found.odd].name,
+            found.own.to_degrees(),
+            found.theirs.to_degrees(),
+            cause(&found.model, &runs[found.odd], &found.rest).map_or(String::new(), |cause| format!("; {cause}"))
         ));
-        (runs, model) = (rest, of_rest);
+        (runs, model) = (found.rest, found.model);
         left_out += 1.0;
     }
     Ok((runs, model))
+}
+
+/// The runs without one of them.
+struct Without {
+    odd: usize,
+    rest: Vec<SensorRun>,
+    model: SensorModel,
+    /// what the model of the rest leaves of the one, and of the worst of the rest, rad rms
+    own: f64,
+    theirs: f64,
+}
+
+impl Without {
+    fn apart(&self) -> f64 {
+        self.own / self.theirs
+    }
+}
+
+fn without(
+    runs: &[SensorRun],
+    odd: usize,
+    identify: &impl Fn(&[SensorRun]) -> Result<SensorModel, Refusal>,
+) -> Option<Without> {
+    let others = runs.iter().enumerate().filter(|(at, _)| *at != odd);
+    let rest: Vec<SensorRun> = others.map(|(_, run)| run.clone()).collect();
+    let model = identify(&rest).ok()?;
+    let own = scatter(&model.left(&runs[odd]));
+    let theirs = rest.iter().map(|r| scatter(&model.left(r))).fold(0.0, f64::max);
+    Some(Without { odd, rest, model, own, theirs })
+}
+
+/// The run of which far more is left than of the others. Of few runs that read an angle each may be the odd one: a model of all of them is
+/// as far off one as the other.
+fn suspects(runs: &[SensorRun], model: &SensorModel) -> Vec<usize> {
+    let left: Vec<f64> = runs.iter().map(|r| scatter(&model.left(r))).collect();
+    let Some(worst) = (0..runs.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])) else { return Vec::new() };
+    let mut others: Vec<f64> = (0..runs.len()).filter(|at| *at != worst).map(|at| left[at]).collect();
+    if left[worst] > SUSPECT * median(&mut others) {
+        return vec![worst];
+    }
+    let few = runs.len() <= FEW && runs.iter().all(|r| r.channels().is_none());
+    if few { (0..runs.len()).collect() } else { Vec::new() }
+}
+
+/// Root of the mean square about the mean.
+fn scatter(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    root_mean_square(&values.iter().map(|v| v - mean).collect::<Vec<_>>())
 }
 
 /// What is odd about a run, where that is one thing.

@@ -19,6 +19,11 @@ use crate::report::{EffectReport, Estimate, ParameterReport};
 /// A response that moves the angle by less than this, rms, is not worth a word, rad: 0.0006°, an engineering choice.
 const LEAST_RESPONSE: f64 = 1e-5;
 
+/// Rounds in which the bias and how the scale factor goes with the rate settle.
+const MOST_ROUNDS: usize = 6;
+/// Rows of a run beyond which steps of its rate are looked for in every so many.
+const ENOUGH_ROWS_OF_A_RUN: usize = 10_000;
+
 /// Identifies a rate gyroscope from the runs to fit, and says what has to be said of it.
 ///
 /// # Errors
@@ -29,21 +34,26 @@ pub(super) fn rate_finding(
     runs: &[SensorRun],
     held: &[SensorRun],
 ) -> Result<Finding<'static>, Refusal> {
-    let model = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
+    // what serves best where nothing undoes how the scale factor goes with the rate
+    let applied = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
         Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
     })?;
     let thinned = thinned(runs);
-    let (model, by_nonlinearity) = beside_nonlinearity(model, stated, period, runs, &thinned);
+    let (model, by_nonlinearity) = beside_nonlinearity(&applied, stated, period, runs);
     let scale_factor = by_nonlinearity.as_ref().map(|n| n.found);
     let (gain, deviation) = model.gain;
     let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
+    let applied_gain = sign * applied.gain.0.abs();
     let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
     let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
     neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
-    let mut hypothesis =
-        Hypothesis { angular_gain: value, rate_bias_rad_s: model.value(Term::Bias), ..neutral_hypothesis.clone() };
-    let latency = model.latency_s();
+    let mut hypothesis = Hypothesis {
+        angular_gain: applied_gain,
+        rate_bias_rad_s: applied.value(Term::Bias),
+        ..neutral_hypothesis.clone()
+    };
+    let latency = applied.latency_s();
     if latency != 0.0 {
         let values = [latency, 0.0, 0.0, 0.0];
         hypothesis.members.push(Member {
@@ -55,7 +65,15 @@ pub(super) fn rate_finding(
     }
 
     let samples = model.sensor.samples(&thinned, None);
-    let warnings = said_of(&model, runs, held, by_nonlinearity.as_ref())?;
+    let mut warnings = said_of(&model, runs, held, by_nonlinearity.as_ref())?;
+    if by_nonlinearity.as_ref().is_some_and(Nonlinearity::is_told) {
+        warnings.push(format!(
+            "the scale factor goes with the rate, which a calibration does not undo: bias and scale factor are those beside it, and the \
+             calibration has what serves best without, a bias of {:.5} deg/s and a scale factor of {:.6}",
+            applied.value(Term::Bias).to_degrees(),
+            applied_gain.abs()
+        ));
+    }
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
@@ -76,10 +94,12 @@ pub(super) fn rate_finding(
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
         alone: model.answered.then(|| -> ByItself<'_> {
-            let (model, runs) = (model.clone(), thinned.clone());
-            Box::new(move |run| model.alone(run, &runs))
+            let (model, told) = (model.clone(), by_nonlinearity.filter(Nonlinearity::is_told));
+            let linear = move |run: &SensorRun| told.map_or_else(|| run.clone(), |told| told.taken_out(run));
+            let runs: Vec<SensorRun> = thinned.iter().map(&linear).collect();
+            Box::new(move |run| model.alone(&linear(run), &runs))
         }),
-        discovered: Box::new(move |run| model.left(run)),
+        discovered: Box::new(move |run| applied.left(run)),
         readout: None,
         direction: Box::new(move |run| {
             sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
@@ -91,20 +111,31 @@ pub(super) fn rate_finding(
 /// The gyroscope with what its scale factor does with the rate, where the runs tell that: bias and lag are then those of runs
 /// from which it was taken out. Steps of the rate would show it as a lag.
 fn beside_nonlinearity(
-    model: RateGyroscope,
+    model: &RateGyroscope,
     stated: Option<f64>,
     period: f64,
     runs: &[SensorRun],
-    thinned: &[SensorRun],
 ) -> (RateGyroscope, Option<Nonlinearity>) {
-    let Some(first) = Nonlinearity::of_the_gains(&model, thinned) else { return (model, None) };
-    if !first.is_told() {
-        return (model, Some(first));
+    // steps of the rate are found in each run by itself
+    let enough: Vec<SensorRun> = runs.iter().map(|run| run.thinned(run.len() / ENOUGH_ROWS_OF_A_RUN)).collect();
+    let mut found = (model.clone(), Nonlinearity::of_the_gains(model, &enough));
+    for _ in 0..MOST_ROUNDS {
+        let (_, Some(last)) = &found else { break };
+        if !last.is_told() {
+            break;
+        }
+        let last = *last;
+        let linear: Vec<SensorRun> = runs.iter().map(|run| last.taken_out(run)).collect();
+        let Some(mut beside) = RateGyroscope::identify(stated, period, &linear) else { break };
+        let again = Nonlinearity::of_the_gains(&beside, &enough);
+        let settled = again.as_ref().is_none_or(|again| again.is(&last));
+        beside.allow_for(model, last.uncertainty());
+        found = (beside, again);
+        if settled {
+            break;
+        }
     }
-    let linear: Vec<SensorRun> = runs.iter().map(|run| first.taken_out(run)).collect();
-    let Some(model) = RateGyroscope::identify(stated, period, &linear) else { return (model, Some(first)) };
-    let again = Nonlinearity::of_the_gains(&model, thinned);
-    (model, again)
+    found
 }
 
 /// What has to be said of a rate gyroscope beside its numbers, a scale factor that goes with the rate among them.

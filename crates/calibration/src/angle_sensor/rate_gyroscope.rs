@@ -12,7 +12,7 @@
 //! instrument.
 
 use super::cross_validation::Folds;
-use super::rate_deviations::{deviations, of_a_walk};
+use super::rate_deviations::{T_PARTS, deviations, of_a_walk};
 use super::rate_regression::{ErrorLaw, Row, Stretch, Term, ago, estimate, mean_rates, rows, solved, variance};
 use super::samples::SensorRun;
 use super::sensor::Sensor;
@@ -207,6 +207,17 @@ impl RateGyroscope {
                 tells_scale.map(|_| deviations(&all, &every, &estimate(&all, &every, law), &every_fit)[1]),
             ),
         })
+    }
+
+    /// Allows, in every term, for a share of what another answer has otherwise, as a half width.
+    pub(super) fn allow_for(&mut self, other: &Self, share: f64) {
+        let allowed = |own: f64, theirs: f64| share * (own - theirs) / T_PARTS;
+        for (term, value, deviation) in &mut self.terms {
+            *deviation = deviation.hypot(allowed(*value, other.value(*term)));
+        }
+        if let Some(deviation) = &mut self.gain.1 {
+            *deviation = deviation.hypot(allowed(self.gain.0, other.gain.0));
+        }
     }
 
     /// By how much the angle is late, s; 0 where that is not told.

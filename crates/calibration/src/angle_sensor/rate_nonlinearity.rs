@@ -41,6 +41,19 @@ impl Nonlinearity {
         [self.found.nonlinearity_ppm, self.found.asymmetry_ppm].iter().any(|e| e.value.abs() > e.half_width())
     }
 
+    /// Whether it is this one, to a tenth of its intervals.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        let alike = |a: Estimate, b: Estimate| (a.value - b.value).abs() < 0.1 * a.half_width();
+        alike(self.found.nonlinearity_ppm, other.found.nonlinearity_ppm)
+            && alike(self.found.asymmetry_ppm, other.found.asymmetry_ppm)
+    }
+
+    /// By what share of itself it is uncertain, as a half width: that of the part that is told better.
+    pub(super) fn uncertainty(&self) -> f64 {
+        let share = |e: Estimate| e.half_width() / e.value.abs().max(f64::MIN_POSITIVE);
+        share(self.found.nonlinearity_ppm).min(share(self.found.asymmetry_ppm))
+    }
+
     /// What it adds to the angle in the course of a run, rad.
     pub(super) fn of(&self, run: &SensorRun) -> Vec<f64> {
         let [slow, fast] = self.speeds;

@@ -11,7 +11,7 @@ use super::cross_validation::{
     Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, losses_of_radius,
 };
 use super::ellipse;
-use super::lines::strongest_and_its_aliases;
+use super::lines::{is_harmonic_of_table, strongest_and_its_aliases};
 use super::rails::Rails;
 use super::readout::{Kind, Readout, unknowns_of_texts};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
@@ -46,9 +46,10 @@ const FINALISTS: usize = 3;
 const MOST_LINES: usize = 6;
 /// A rate whose standard deviation is below this share of its largest is constant, and lag with it.
 pub(crate) const VARYING_RATE: f64 = 0.02;
-/// Speeds that differ by less than this share are one, where no more than this share of the rows has another: engineering choices.
+/// Speeds that differ by less than this share are one: engineering choice.
 const ONE_SPEED: f64 = 0.1;
-const WHERE_IT_TURNS_BACK: f64 = 0.15;
+/// Rows in a row whose rate is a difference over a turn: the one at which it turns back and those beside it.
+const ROWS_OF_A_TURN: usize = 3;
 /// A motion of which less than this share, in power, is no function of the position is not told from it.
 const LEAST_OF_ITS_OWN: f64 = 1e-2;
 
@@ -234,11 +235,13 @@ impl<'a> Selection<'a> {
         self.motion_among(front, &all)
     }
 
-    /// Whether the speed is one but where it turns back.
+    /// Whether the speed is one but for the rows at which it turns back, whose rates are differences over the turn.
     fn turns_at_one_speed(&self, rates: &[f64]) -> bool {
         let usual = median(&mut rates.iter().map(|r| r.abs()).collect::<Vec<_>>());
-        let others = rates.iter().filter(|r| (r.abs() / usual - 1.0).abs() > ONE_SPEED).count();
-        (others as f64) < WHERE_IT_TURNS_BACK * rates.len() as f64
+        let is_another = |rate: &f64| (rate.abs() / usual - 1.0).abs() > ONE_SPEED;
+        rates
+            .chunk_by(|a, b| is_another(a) == is_another(b))
+            .all(|part| part.len() <= ROWS_OF_A_TURN || !is_another(&part[0]))
     }
 
     fn motion_among(&mut self, front: &Option<Front>, all: &[Motion]) -> Vec<Motion> {
@@ -357,10 +360,14 @@ impl<'a> Selection<'a> {
         orders.sort_unstable();
         orders.dedup();
         let lines = strongest_and_its_aliases(&samples, &table, self.sensor.cycles_per_turn());
+        let cycles = self.sensor.cycles_per_turn();
         let mut with: Vec<Candidate<Model>> = lines
             .into_iter()
             .filter_map(|line| {
                 let lines: Vec<u32> = shape.lines.iter().copied().chain([line]).collect();
+                // a table that holds the line as one of its own harmonics does not tell the two
+                let beside = |order: &usize| *order == shape.order || !is_harmonic_of_table(line, *order, cycles);
+                let orders: Vec<usize> = orders.iter().copied().filter(beside).collect();
                 let all = self.offer(std::slice::from_ref(front), &self.shapes(&orders, &[shape.motion], &lines));
                 choose(&all, Tolerance::One).cloned()
             })

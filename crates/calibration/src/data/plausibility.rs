@@ -11,7 +11,7 @@ use crate::data::rail::rows_at_rails;
 use crate::data::rate_spikes;
 use crate::data::references::references;
 use crate::numerics::statistics::median;
-use crate::recording::{Channel, Recording};
+use crate::recording::{Channel, Recording, Run};
 
 /// A held value makes up for it by more than this many of its usual smallest steps.
 pub(super) const JUMP: f64 = 3.0;
@@ -257,6 +257,46 @@ pub(crate) fn without_held_commands(recording: &mut Recording, warnings: &mut Ve
     }
 }
 
+/// An energy command that holds the amplitude of one run with this many times as much as those of the others is in another unit.
+const OTHER_UNIT: f64 = 30.0;
+/// … where those hold theirs alike, within this factor.
+const ALIKE: f64 = 3.0;
+/// Runs that have to be there for one to be the odd one.
+const FEWEST_RUNS: usize = 3;
+
+/// The same for the commands of a run whose energy command is in another unit than those of most runs: per volt of amplitude all
+/// runs of an instrument need as much of it.
+pub(crate) fn without_commands_in_another_unit(runs: &mut [Run], warnings: &mut Vec<String>) {
+    let levels: Vec<Option<f64>> = runs.iter().map(|run| command_per_amplitude(&run.recording)).collect();
+    let mut told: Vec<f64> = levels.iter().copied().flatten().collect();
+    if told.len() < FEWEST_RUNS {
+        return;
+    }
+    let common = median(&mut told);
+    let apart = |level: f64, factor: f64| level > factor * common || level * factor < common;
+    if told.iter().filter(|level| apart(**level, ALIKE)).count() * 3 > told.len() {
+        return;
+    }
+    for (run, level) in runs.iter_mut().zip(levels) {
+        let Some(level) = level.filter(|level| apart(*level, OTHER_UNIT)) else { continue };
+        (run.recording.vas_v, run.recording.vqc_v) = (None, None);
+        warnings.push(format!(
+            "{}: vas_v holds its amplitude with {:.3} times as much as in the other runs: its commands are in another unit, or of another \
+             drive, and count as not recorded; wanted: vas_v and vqc_v in V",
+            run.recording.source.display(),
+            level / common
+        ));
+    }
+}
+
+/// The usual energy command over the amplitude that is read; `None` where either is not recorded or nothing.
+fn command_per_amplitude(recording: &Recording) -> Option<f64> {
+    let (x, y) = (recording.xc_v.as_deref()?, recording.yc_v.as_deref()?);
+    let amplitude = median(&mut x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect::<Vec<_>>());
+    let level = median(&mut recording.vas_v.as_deref()?.to_vec()).abs() / amplitude;
+    (level.is_finite() && level > 0.0).then_some(level)
+}
+
 /// For how many rows each value stands, where that is the same for nearly all: changes at regular rows, and of any size. A
 /// coarse converter changes by its own step, and when the value is due.
 fn rows_held(values: &[f64]) -> Option<usize> {
@@ -355,6 +395,41 @@ pub(super) mod tests {
             let value = v[rows.start];
             v[rows.clone()].fill(value);
         }
+    }
+
+    #[test]
+    fn commands_of_one_run_in_millivolts_are_named_and_not_taken() {
+        let run = |number: usize, unit: f64| {
+            let wobble = |i: usize| 1.0 + 0.1 * (0.3 * i as f64).sin();
+            let recording = Recording {
+                t_s: (0..50).map(f64::from).collect(),
+                xc_v: Some(vec![0.6; 50]),
+                yc_v: Some(vec![-0.8; 50]),
+                vas_v: Some((0..50).map(|i| -0.05 * unit * wobble(i)).collect()),
+                vqc_v: Some(vec![1e-3; 50]),
+                ..Recording::default()
+            };
+            Run {
+                kind: crate::recording::RunKind::Rotation,
+                file: format!("{number}.csv").into(),
+                role: crate::recording::Role::Fit,
+                settle_s: 0.0,
+                amplitude: None,
+                recording,
+            }
+        };
+        let commands = |units: &[f64]| {
+            let mut runs: Vec<Run> = units.iter().enumerate().map(|(i, unit)| run(i, *unit)).collect();
+            let mut warnings = Vec::new();
+            without_commands_in_another_unit(&mut runs, &mut warnings);
+            (runs.iter().map(|r| r.recording.vas_v.is_some()).collect::<Vec<_>>(), warnings)
+        };
+        let (kept, warnings) = commands(&[1.0, 1000.0, 1.2, 0.9]);
+        assert_eq!(kept, [true, false, true, true]);
+        assert!(warnings.len() == 1 && warnings[0].contains("times as much as in the other runs"), "{warnings:?}");
+        assert_eq!(commands(&[1.0, 2.0, 0.7]), (vec![true; 3], vec![]));
+        // nobody knows which of two is right
+        assert_eq!(commands(&[1.0, 1000.0]), (vec![true; 2], vec![]));
     }
 
     #[test]

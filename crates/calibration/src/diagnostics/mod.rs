@@ -2,6 +2,7 @@
 
 pub mod allan;
 pub(crate) mod at_rest;
+pub(crate) mod covariance;
 pub(crate) mod decomposition;
 pub(crate) mod drives;
 pub(crate) mod evaluate;

@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
+use crate::diagnostics::covariance::of_blocks;
 use crate::estimation::fit::{Effort, Fit, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::propagation::Start;
@@ -16,7 +17,6 @@ use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::robust_deviation;
 use crate::recording::Role;
-use crate::selection::last_step::of_blocks;
 
 /// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
 const BIAS_DPS: f64 = 0.004_2;

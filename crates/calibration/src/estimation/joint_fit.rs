@@ -3,7 +3,7 @@
 use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::data::plausibility::{without_dead_command, without_held_commands};
+use crate::data::plausibility::{without_commands_in_another_unit, without_dead_command, without_held_commands};
 use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
@@ -91,6 +91,7 @@ impl Dataset {
             without_dead_command(&mut run.recording, f64::INFINITY, &mut warnings);
             without_held_commands(&mut run.recording, &mut warnings);
         }
+        without_commands_in_another_unit(&mut rotations, &mut warnings);
         // a ring-down tells nothing without its command
         let (mut ring_down_runs, mut ring_downs_left_out) = (Vec::new(), Vec::new());
         for mut run in ring_downs {

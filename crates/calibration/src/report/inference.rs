@@ -17,6 +17,7 @@ use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
 use crate::report::polar::polar;
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport};
+use crate::selection::candidates::alike_at_one_amplitude;
 use crate::selection::step::Step;
 
 /// Share of its prior's width to which an unknown must narrow to count as told by the data.
@@ -111,15 +112,24 @@ impl Inference<'_> {
     }
 
     /// What a fault of the drives could be by as much damping as nobody knows, where their commands were not recorded: what they do
-    /// is the damping that they replace times the fault, and two faults that nearly cancel narrow it by their product alone.
+    /// against it is the damping times the fault, and two faults that nearly cancel narrow it by their product alone. What they do
+    /// against a split of the frequencies, where there is one, tells them by itself.
     fn by_damping(&self, unknown: Unknown) -> f64 {
         let (Unknown::Effect(at, p), Some(damping)) = (unknown, self.index(Unknown::Damping)) else { return 0.0 };
         let member = &self.hypothesis().members[at];
-        if member.id.description().stage != Stage::Actuation {
+        if member.id.description().stage != Stage::Actuation || self.tells_a_split() {
             return 0.0;
         }
-        let unknown_share = self.covariance[(damping, damping)].max(0.0).sqrt() / self.hypothesis().damping_per_s;
-        (unknown_share * (member.values[p] - member.id.neutral::<f64>()[p])).abs()
+        let share = self.covariance[(damping, damping)].max(0.0).sqrt() / self.hypothesis().damping_per_s;
+        (share * (member.values[p] - member.id.neutral::<f64>()[p])).abs()
+    }
+
+    /// A split of the frequencies is told from nothing.
+    fn tells_a_split(&self) -> bool {
+        let Some(at) = self.hypothesis().position(EffectId::Anisoelasticity) else { return false };
+        let values = &self.hypothesis().members[at].values;
+        let variance = |p: usize| self.index(Unknown::Effect(at, p)).map_or(0.0, |i| self.covariance[(i, i)].max(0.0));
+        values[0].hypot(values[1]) > 1.96 * (variance(0) + variance(1)).sqrt()
     }
 
     fn estimate(&self, unknown: Unknown) -> Estimate {
@@ -399,9 +409,11 @@ impl Inference<'_> {
             .map(|(at, m)| {
                 let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
                 let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
-                for r in step.map(|s| s.confounded_with.as_slice()).unwrap_or_default() {
-                    if !rivals.contains(r) {
-                        rivals.push(*r);
+                let found = step.map(|s| s.confounded_with.as_slice()).unwrap_or_default().iter().copied();
+                let at_one_amplitude = alike.amplitude && m.origin == Origin::Discovered;
+                for r in found.chain(alike_at_one_amplitude(m.id).filter(|_| at_one_amplitude)) {
+                    if !rivals.contains(&r) {
+                        rivals.push(r);
                     }
                 }
                 let mut without = self.hypothesis().clone();

@@ -33,6 +33,20 @@ pub(crate) struct Candidate {
     pub(crate) tried: f64,
 }
 
+/// A higher power of the amplitude is the lowest one where there is one amplitude.
+fn is_of_a_higher_power(id: EffectId) -> bool {
+    id.description().scaling.amplitude > LOWEST_POWER
+}
+
+/// The effects of the library that are this one where all runs are at one amplitude.
+pub(crate) fn alike_at_one_amplitude(id: EffectId) -> impl Iterator<Item = EffectId> {
+    let own = id.description();
+    let is_lowest =
+        own.scaling.amplitude == LOWEST_POWER && own.stage == Stage::Readout && own.onsets.is_empty() && !own.empirical;
+    let all = EffectId::ALL.iter().copied().filter(move |_| is_lowest);
+    all.filter(move |other| is_of_a_higher_power(*other) && other.description().stage == own.stage)
+}
+
 /// Every way to extend a hypothesis on this dataset.
 pub(crate) fn candidates(
     dataset: &Dataset,
@@ -47,8 +61,7 @@ pub(crate) fn candidates(
         let d = id.description();
         let unseen = (d.stage == Stage::Actuation || id.seen_by_loops()) && !loops;
         let unmeasured = id.by_temperature() && !dataset.temperature_varies();
-        // a higher power of the amplitude is a lower one where there is one amplitude
-        let unresolved = d.scaling.amplitude > LOWEST_POWER && dataset.alike().amplitude;
+        let unresolved = is_of_a_higher_power(id) && dataset.alike().amplitude;
         // the angle hardly shows drives that clip: the quadrature balance tells them
         let told_elsewhere = id.limits_drives() && id.in_library();
         if d.declared || unseen || told_elsewhere || unmeasured || unresolved || (sensor && !d.in_sensors) {
