@@ -4,9 +4,9 @@ use cvg_model::effects::EffectId;
 
 use super::identify::{take_apart, thinned};
 use super::rate_deviations::T_PARTS;
-use super::rate_gyroscope::RateGyroscope;
+use super::rate_gyroscope::{RateGyroscope, tell_scale};
 use super::rate_nonlinearity::Nonlinearity;
-use super::rate_regression::Term;
+use super::rate_regression::{Stretch, Term};
 use super::rate_runs;
 use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
@@ -95,7 +95,13 @@ pub(super) fn rate_finding(
         declared: Box::new(raw),
         alone: model.answered.then(|| -> ByItself<'_> {
             let (model, told) = (model.clone(), by_nonlinearity.filter(Nonlinearity::is_told));
-            let linear = move |run: &SensorRun| told.map_or_else(|| run.clone(), |told| told.taken_out(run));
+            // at one rate what goes with the rate is part of what the run tells
+            let turns_at_several =
+                move |run: &SensorRun| Stretch::new(run, 0, &sensor, 0.0).is_some_and(|s| tell_scale(&[s]));
+            let linear = move |run: &SensorRun| match told.filter(|_| turns_at_several(run)) {
+                Some(told) => told.taken_out(run),
+                None => run.clone(),
+            };
             let runs: Vec<SensorRun> = thinned.iter().map(&linear).collect();
             Box::new(move |run| model.alone(&linear(run), &runs))
         }),
