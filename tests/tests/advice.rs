@@ -108,6 +108,20 @@ fn a_drive_that_rotation_alone_cannot_tell_is_told_by_ring_downs() {
 }
 
 #[test]
+fn a_cubic_at_one_amplitude_may_be_a_quintic_and_a_second_amplitude_tells() {
+    let cubic = [effect(EffectId::DetectionCubic, &[0.004])];
+    let told = |files: &[&str]| {
+        let identified = identify(bench(&cubic, files, true)).unwrap();
+        assert_eq!(found(&identified, Origin::Discovered), ["detection-cubic"]);
+        confounded(&identified)
+    };
+    let (pairs, advice) = told(&["rot+500.csv", BACK, SLOWER]);
+    assert_eq!(pairs, ["detection-cubic with detection-quintic"]);
+    assert_eq!(advice.as_deref(), Some("a rotation run at another amplitude"));
+    assert_eq!(told(&["rot+500.csv", BACK, SLOWER, CHECK]), (vec![], None));
+}
+
+#[test]
 fn a_fourth_harmonic_of_unknown_cause_is_named_by_the_advised_runs() {
     let cubic = effect(EffectId::DetectionCubic, &[0.004]);
     let (advised, identified) = followed(&[cubic], &["rot+500.csv"], false);

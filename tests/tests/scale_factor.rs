@@ -3,7 +3,10 @@
 
 use cvg_calibration::recording::{Campaign, Instrument, Recording, Role, Run};
 use cvg_calibration::report::Estimate;
+use cvg_model::effects::EffectId;
+use cvg_simulator::scenario::Run as Simulated;
 use cvg_tests::angle_sensor::{Noise, identified, run, sensor};
+use cvg_tests::bench::{all, effect, holds, identify, plain_paper, trials};
 
 const BIAS_DPS: f64 = 0.2;
 
@@ -29,7 +32,7 @@ fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed
         let runs = rates.iter().enumerate().map(|(n, rate)| steady(*rate, of(*rate), n as u64)).collect();
         let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
         let report = identified(campaign).report;
-        let holds = |e: Estimate, planted: f64| e.ci95[0] <= planted && planted <= e.ci95[1];
+        let holds = |e: Estimate, planted: f64| holds(&e, planted);
         let scale = report.scale_factor.unwrap();
         assert!(holds(scale.nonlinearity_ppm, ppm) && scale.nonlinearity_ppm.half_width() < 20.0, "{scale:?}");
         assert!(holds(scale.asymmetry_ppm, 0.0), "{scale:?}");
@@ -79,11 +82,38 @@ fn a_staircase_of_rates_in_one_run_tells_as_much_and_no_slip_or_lag_is_made_of_i
         let runs = vec![staircase(&rates, of, seed)];
         let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
         let report = identified(campaign).report;
-        let holds = |e: Estimate, planted: f64| e.ci95[0] <= planted && planted <= e.ci95[1];
+        let holds = |e: Estimate, planted: f64| holds(&e, planted);
         let scale = report.scale_factor.unwrap();
         assert!(holds(scale.nonlinearity_ppm, nonlinearity), "{scale:?}");
         assert!(holds(scale.asymmetry_ppm, asymmetry) && scale.asymmetry_ppm.half_width() < 50.0, "{scale:?}");
         assert!(report.effects.iter().all(|e| e.id != "angle-latency"), "{:?}", report.effects);
         assert!(report.warnings.len() == 1 && is_not_undone(&report.warnings[0]), "{:?}", report.warnings);
     }
+}
+
+/// A whole-angle gyroscope of which four runs at four rates, without ring-downs, leave the mechanics open: what that makes of the slowest
+/// run's gain was not in the intervals, of which nine of sixteen missed.
+#[test]
+fn what_the_fit_leaves_open_is_in_the_intervals_of_a_whole_angle_gyroscope() {
+    let missed: Vec<usize> = all(trials(8), |seed| {
+        let mut settings = plain_paper();
+        (settings.seed, settings.noise_v) = (1600 + seed, 3e-4);
+        settings.effects.push(effect(EffectId::DetectionCubic, &[0.004]));
+        settings.runs.retain(|r| matches!(r, Simulated::Rotation { file, .. } if file != "rot+500-low.csv"));
+        for run in &mut settings.runs {
+            if let Simulated::Rotation { rate_dps, .. } = run
+                && *rate_dps == 60.0
+            {
+                *rate_dps = -60.0;
+            }
+        }
+        let found = identify(settings).unwrap().report.scale_factor.unwrap();
+        let parts = [found.nonlinearity_ppm, found.asymmetry_ppm];
+        println!("{seed}: {parts:?}");
+        assert!(parts.iter().all(|e| e.half_width() < 200.0), "{seed}: {parts:?} says nothing");
+        parts.iter().filter(|e| !holds(e, 0.0)).count()
+    });
+    // of 16 intervals of 95 %, more than three miss in 0.7 % of all draws
+    let most = 3 * missed.len() / 8;
+    assert!(missed.iter().sum::<usize>() <= most, "{missed:?}");
 }

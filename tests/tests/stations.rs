@@ -365,6 +365,34 @@ fn twelve_stations_carry_four_harmonics() {
     }
 }
 
+/// Play of 0.1° at stations there and back at one speed: the rates of the rows at which it turns back are differences over the turn, and
+/// made a lag of it in one of five such campaigns.
+#[test]
+fn play_at_one_speed_is_no_lag() {
+    for seed in 0..12 {
+        let mut noise = Noise::new(seed);
+        let mut at = |role| {
+            let there = (0..101).map(|i| (f64::from(i) * 3.6, 0.05));
+            let back = (0..101).rev().map(|i| (f64::from(i) * 3.6, -0.05));
+            let path: Vec<(f64, f64)> = there.chain(back).collect();
+            let theta = |(degrees, play): &(f64, f64)| {
+                let a = degrees.to_radians();
+                degrees + play + 0.15 * a.sin() + 0.05 * (2.0 * a).cos() + 0.02 * noise.sample()
+            };
+            let recording = Recording {
+                t_s: (0..path.len()).map(|i| i as f64).collect(),
+                theta_deg: Some(path.iter().map(theta).collect()),
+                table_deg: Some(path.iter().map(|p| p.0).collect()),
+                ..Recording::default()
+            };
+            run("stations.csv", role, recording)
+        };
+        let i = identified(sensor(vec![at(Role::Fit), at(Role::Holdout)]));
+        assert!(find(&i, "angle-latency").is_none(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 1.5 * 0.02, "seed {seed}: {}°", held_out(&i));
+    }
+}
+
 /// One run of another encoder among three and among five: a model of all of three is as far off one as the other, and found nothing.
 #[test]
 fn a_run_of_another_encoder_is_left_out() {

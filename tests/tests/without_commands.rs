@@ -4,8 +4,9 @@
 
 use cvg_calibration::recording::{Campaign, Recording, Role};
 use cvg_calibration::report::Estimate;
+use cvg_simulator::scenario::Run;
 use cvg_tests::angle_sensor::{Noise, identified, run};
-use cvg_tests::bench::{all, holds, trials};
+use cvg_tests::bench::{all, holds, plain_paper, scenario, trials};
 
 const ANGULAR_GAIN: f64 = 0.78;
 const DETECTION_RATIO: f64 = 1.0132;
@@ -105,4 +106,20 @@ fn a_fourth_harmonic_is_no_ratio_of_the_drives() {
         assert!(interval.is_none_or(|[low, high]| low <= 1.0 && 1.0 <= high), "{seed}: {of_the_drives:?}");
         assert!(report.heldout.discovered.rms_deg < 0.02, "{seed}: {:?}", report.heldout);
     });
+}
+
+/// The energy command of one run in mV, which made k of ± 2e-6 twelve half-widths off.
+#[test]
+fn commands_of_one_run_in_another_unit_are_named_and_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut settings = plain_paper();
+    settings.runs.retain(|r| matches!(r, Run::Rotation { .. }));
+    scenario(settings).simulate().write(folder.path()).unwrap();
+    let mut campaign = Campaign::open(&folder.path().join("campaign.toml")).unwrap();
+    campaign.runs[1].recording.vas_v.as_mut().unwrap().iter_mut().for_each(|v| *v *= 1e3);
+    let file = campaign.runs[1].file.display().to_string();
+    let report = identified(campaign).report;
+    let named = report.warnings.iter().any(|w| w.contains(&file) && w.contains("times as much as in the other runs"));
+    assert!(named, "{:?}", report.warnings);
+    assert!(holds(&report.angular_gain, ANGULAR_GAIN), "{:?}", report.angular_gain);
 }

@@ -20,8 +20,6 @@ impl Recording {
     /// The unit of each of these columns, `-` where none is known, if one of them has to be stated.
     pub(crate) fn stated_units(&self, outlets: &[(&str, Outlet<'_>)]) -> Option<Vec<&str>> {
         let has_to_be = |(name, outlet): &(&str, Outlet<'_>)| is_taken_for_another(name, outlet);
-        let is_of_the_readout =
-            |name: &str| matches!(channel(name), Some(Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys));
         let readout = self.readout_unit.is_some() && outlets.iter().any(|(name, _)| is_of_the_readout(name));
         let is_stated = readout || outlets.iter().any(has_to_be);
         is_stated.then(|| outlets.iter().map(|(name, _)| self.unit(name)).collect())
@@ -30,7 +28,7 @@ impl Recording {
     fn unit(&self, name: &str) -> &str {
         match channel(name) {
             None | Some(Channel::X | Channel::Y) => "-",
-            Some(Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys) => self.readout_unit.as_deref().unwrap_or("V"),
+            Some(_) if is_of_the_readout(name) => self.readout_unit.as_deref().unwrap_or("V"),
             Some(channel) => units::of_channel(channel),
         }
     }
@@ -46,6 +44,10 @@ fn is_taken_for_another(name: &str, outlet: &Outlet<'_>) -> bool {
         Some(Channel::Temperature) => units::absolute(values).is_some(),
         _ => false,
     }
+}
+
+fn is_of_the_readout(name: &str) -> bool {
+    matches!(channel(name), Some(Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys))
 }
 
 fn channel(name: &str) -> Option<Channel> {

@@ -214,6 +214,7 @@ fn what_makes_no_sense_is_refused_with_the_key_and_what_would_be_right() {
         ("device = \"t\"\nangular_gain = 0.0\nrun = []\n".to_owned(), "angular_gain: is 0"),
         ("device = \"t\"\nangular_gain = 1.2e33\nrun = []\n".to_owned(), "is no angular gain"),
         ("device = \"t\"\nangular_gain = 0.7\nrun = []\n".to_owned(), "at least one [[run]]"),
+        (minimal("", "").replace("rate_dps = ", "rate_dps = 1e40 # "), "is no rate: the largest is 1000000"),
     ] {
         let error = refusal(&text);
         assert!(error.contains(wanted), "{error}\n  does not say: {wanted}");

@@ -24,7 +24,7 @@ const ALIAS: f64 = 0.4;
 const SAME: f64 = 0.9;
 const ANOTHER: f64 = 0.75;
 /// Multiples of the stations' number about which aliases of a line lie.
-const FOLDS: u32 = 3;
+const MULTIPLES: u32 = 3;
 /// Lines that are tried in its place, itself among them.
 const MOST_ALIASES: usize = 4;
 /// A usual distance of stations is at most so many times their spacing.
@@ -92,7 +92,7 @@ fn beats(a: u32, b: u32, reference: &[f64]) -> [[f64; 2]; 2] {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive counts, saturating")]
 fn folded(n: u32, reference: &[f64]) -> impl Iterator<Item = u32> {
     let stations = std::f64::consts::TAU / spacing(reference).max(1e-12);
-    let about = (1..=FOLDS).map(move |fold| f64::from(fold) * stations);
+    let about = (1..=MULTIPLES).map(move |multiple| f64::from(multiple) * stations);
     let all = about.flat_map(move |of| [of - f64::from(n), of + f64::from(n)]).map(|m| m.abs().round() as u32);
     all.filter(move |m| *m > 0 && *m != n)
 }

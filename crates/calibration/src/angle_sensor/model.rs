@@ -216,7 +216,7 @@ impl SensorModel {
     /// not tell from another there, each with that other.
     pub(crate) fn where_asked(&self, fitted: &[SensorRun], asked: &[SensorRun]) -> (Self, Vec<[u32; 2]>) {
         let positions =
-            |runs: &[SensorRun]| -> Vec<f64> { runs.iter().flat_map(|r| r.reference_rad.clone()).collect() };
+            |runs: &[SensorRun]| -> Vec<f64> { runs.iter().flat_map(|r| r.reference_rad.iter().copied()).collect() };
         let (fitted, asked) = (positions(fitted), positions(asked));
         let mut there = self.clone();
         let mut others = Vec::new();

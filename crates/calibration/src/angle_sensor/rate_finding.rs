@@ -133,10 +133,13 @@ fn beside_nonlinearity(
         let last = *last;
         let linear: Vec<SensorRun> = runs.iter().map(|run| last.taken_out(run)).collect();
         let Some(mut beside) = RateGyroscope::identify(stated, period, &linear) else { break };
-        let again = Nonlinearity::of_the_gains(&beside, &enough);
-        let settled = again.as_ref().is_none_or(|again| again.is(&last));
+        let Some(again) = Nonlinearity::of_the_gains(&beside, &enough).filter(Nonlinearity::is_told) else {
+            // beside what it was taken for there is none
+            return (model.clone(), None);
+        };
+        let settled = again.is(&last);
         beside.allow_for(model, last.uncertainty());
-        found = (beside, again);
+        found = (beside, Some(again));
         if settled {
             break;
         }
