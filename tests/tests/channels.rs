@@ -2,11 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::report::{ChannelHarmonic, ChannelReport};
-use cvg_calibration::{Follows, Identification};
+use cvg_calibration::{Follows, Identification, Origin};
 
 use cvg_model::effects::EffectId;
 use cvg_simulator::Scenario;
-use cvg_tests::bench::{effect, identify, plain_paper};
+use cvg_simulator::scenario::Run;
+use cvg_tests::bench::{deviations, effect, found, identify, plain_paper};
 
 fn channel<'a>(identified: &'a Identification, stage: &str, name: &str) -> &'a ChannelReport {
     let channels = &identified.report.channels;
@@ -92,4 +93,25 @@ fn paper_the_fourth_harmonic_is_removed_by_97_percent_and_the_spring_is_beaten()
     assert!(fourth(2).amplitude_deg <= 0.03 * fourth(1).amplitude_deg, "{:?}", fourth(2));
     assert_eq!(steps[2].effect.as_deref(), Some("detection-cubic"));
     assert!(steps[2].rivals.iter().any(|r| r.id == "spring-cubic" && r.beaten_by > 100.0), "{:?}", steps[2].rivals);
+}
+
+/// With little quadrature left the angle shows a split by its square alone, in 4θ and in k: one of 0.7 rad/s along another axis
+/// explains the fourth harmonic of a cubic readout, and only the quadrature command says that it is not there.
+#[test]
+fn at_low_rates_a_split_does_not_take_the_place_of_a_cubic_readout() {
+    let mut settings = plain_paper();
+    settings.noise_v = 3e-4;
+    settings.effects.push(effect(EffectId::DetectionCubic, &[0.004]));
+    settings.runs.retain(|r| matches!(r, Run::Rotation { rate_dps, .. } if rate_dps.abs() > 190.0));
+    for (run, rate) in settings.runs.iter_mut().zip([10.0, -10.0, 20.0, -20.0]) {
+        if let Run::Rotation { rate_dps, duration_s, amplitude, .. } = run {
+            (*rate_dps, *duration_s, *amplitude) = (rate, 60.0, 1.0);
+        }
+    }
+    settings.runs.truncate(4);
+    let identified = identify(settings).unwrap();
+    assert_eq!(found(&identified, Origin::Discovered), ["detection-cubic"]);
+    let k = &identified.report.angular_gain;
+    println!("k is {:+.2} deviations off", deviations(k, 0.78));
+    assert!(deviations(k, 0.78).abs() < 4.0, "{k:?}");
 }

@@ -30,7 +30,7 @@ pub(crate) struct Prior {
 }
 
 /// Standard deviations of its prior beyond which the value of a parameter is not believed: one in 16,000 by chance.
-const BEYOND_BELIEF: f64 = 4.0;
+pub(crate) const BEYOND_BELIEF: f64 = 4.0;
 
 impl Prior {
     /// Whether a fit moved a parameter of the drives further than is believed, as it does for want of an effect that is not in
