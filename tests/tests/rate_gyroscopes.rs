@@ -517,3 +517,60 @@ fn an_asymmetry_of_the_scale_factor_is_no_bias_and_leaves_no_more_than_least_squ
         assert!(i.report.warnings.iter().any(|w| w.contains("goes with the rate")), "{:?}", i.report.warnings);
     }
 }
+
+/// One recording of rests and a turn or two, cut into five files: a run that rests tells no scale factor, and one that turns little tells
+/// it within what the other axes make of it.
+#[test]
+fn runs_that_hardly_turn_are_not_of_another_gyroscope() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let mut at = |file: &str, rate: &dyn Fn(f64) -> f64| {
+            let (mut angle, mut walk) = (0.0, 0.0);
+            let rows: Vec<[f64; 3]> = (0..1000)
+                .map(|i| {
+                    let t = 0.01 * f64::from(i);
+                    angle += 0.01 * rate(t);
+                    walk += 0.02 * noise.sample();
+                    [t, angle, 0.99 * angle + 0.1 * t + walk]
+                })
+                .collect();
+            let column = |at: usize| rows.iter().map(|r| r[at]).collect();
+            let recording = Recording {
+                t_s: column(0),
+                table_deg: Some(column(1)),
+                theta_deg: Some(column(2)),
+                ..Recording::default()
+            };
+            run(file, Role::Fit, recording)
+        };
+        let turn = |t: f64| if (4.0..6.0).contains(&t) { 170.0 } else { 0.0 };
+        let back = |t: f64| if (4.0..6.0).contains(&t) { -170.0 } else { 0.0 };
+        let small = |t: f64| if (4.0..5.0).contains(&t) { 4.0 } else { 0.0 };
+        let rest = |t: f64| 0.2 * (0.3 * t).sin();
+        let runs = vec![at("a", &rest), at("b", &turn), at("c", &small), at("d", &back), at("e", &rest)];
+        let i = turned(runs).unwrap_or_else(|refusal| panic!("seed {seed}: {refusal}"));
+        assert!(i.report.warnings.iter().all(|w| !w.contains("left out")), "seed {seed}: {:#?}", i.report.warnings);
+        assert!((i.report.angular_gain.value.abs() - 0.99).abs() < 0.01, "seed {seed}: {:?}", i.report.angular_gain);
+    }
+}
+
+/// One turn in three seconds between rests: a fifth of the time that holds it, left out, would leave rests alone.
+#[test]
+fn a_turn_between_rests_tells_the_scale_factor() {
+    let mut noise = Noise::new(3);
+    let (mut angle, mut walk) = (0.0, 0.0);
+    let rows: Vec<[f64; 3]> = (0..2000)
+        .map(|i| {
+            let t = 0.01 * f64::from(i);
+            angle += if (6.0..9.0).contains(&t) { 1.2 } else { 0.0 };
+            walk += 0.01 * noise.sample();
+            [t, angle, 0.98 * angle + 0.1 * t + walk]
+        })
+        .collect();
+    let column = |at: usize| rows.iter().map(|r| r[at]).collect();
+    let recording =
+        Recording { t_s: column(0), table_deg: Some(column(1)), theta_deg: Some(column(2)), ..Recording::default() };
+    let i = turned(vec![run("turn.csv", Role::Fit, recording)]).unwrap();
+    let k = i.report.angular_gain;
+    assert!((k.value.abs() - 0.98).abs() < k.half_width() && k.half_width() < 0.1, "{k:?}");
+}

@@ -1,6 +1,8 @@
 //! Whether the runs of two channels are of one sensor: what each draws by itself, held against what the others draw. No
 //! reference is asked for.
 
+use std::collections::BTreeSet;
+
 use super::curve::{mean_radius, undone};
 use super::ellipse;
 use super::readout::Readout;
@@ -13,6 +15,8 @@ use crate::numerics::statistics::span;
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
 /// A part of the turn this long without a row leaves an ellipse to be guessed, rad.
 const LARGEST_GAP: f64 = std::f64::consts::PI;
+/// Directions in which a run has to stand: through five any ellipse goes, and a few more have to speak for it.
+const FEWEST_DIRECTIONS: usize = 8;
 /// Rows of a run that are looked at.
 const ENOUGH_ROWS: usize = 1000;
 /// With another run's ellipse undone the radius is off by less than this share, rms, which is an angle error of a degree …
@@ -53,7 +57,9 @@ impl Own {
     fn new(run: &SensorRun) -> Option<Self> {
         let run = run.thinned((run.len() / ENOUGH_ROWS).max(1));
         let readout = ellipse::algebraic(std::slice::from_ref(&run))?;
-        if largest_gap(&readout, std::slice::from_ref(&run)) > LARGEST_GAP {
+        if largest_gap(&readout, std::slice::from_ref(&run)) > LARGEST_GAP
+            || directions(&readout, &run) < FEWEST_DIRECTIONS
+        {
             return None;
         }
         let (left, amplitude) = (off(&readout, &run), readout.amplitude);
@@ -136,6 +142,14 @@ impl Own {
             100.0 * self.left
         )
     }
+}
+
+/// Directions in which a run stands with a readout undone, told to a hundredth of a turn: stations that are read again and again are as
+/// many as they are.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from -50 to 50")]
+fn directions(readout: &Readout, run: &SensorRun) -> usize {
+    let part = |[x, y]: [f64; 2]| (100.0 * y.atan2(x) / std::f64::consts::TAU).round() as i32;
+    undone(readout, std::slice::from_ref(run)).map(part).collect::<BTreeSet<_>>().len()
 }
 
 /// rms of the radius about its mean, as a share of it, with a readout undone.

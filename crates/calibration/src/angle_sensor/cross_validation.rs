@@ -13,6 +13,11 @@ const CONTIGUOUS_BLOCKS: usize = 20;
 /// Periods that each run has to cover for whole runs to be left out, and one run for contiguous fifths.
 const PERIODS_OF_RUNS: f64 = 0.9;
 const PERIODS_OF_ONE: f64 = 1.75;
+/// A part of the period without a row that rows beside it do not bridge, where it is wider than any other by this factor: the last quarter
+/// of a turn that is held out is a fourth, and stations are as far apart everywhere. A sensor that turns through half a turn only is not
+/// asked for the other half. Engineering choices.
+const GAP: std::ops::Range<f64> = 0.15..0.4;
+const ALONE: f64 = 2.0;
 /// Whole runs are left out from this many on.
 const FEWEST_RUNS: usize = 3;
 /// Standard errors that one more line has to gain.
@@ -60,13 +65,17 @@ pub(crate) struct Folds {
 }
 
 impl Folds {
-    /// Whole runs where three or more cover the period; fifths in time where one run repeats it; else interleaved blocks.
+    /// Whole runs where three or more cover the period; fifths in time where one run repeats it; fifths of the way where a part of
+    /// the period has no row, for there the model is asked too; else interleaved blocks.
     pub(crate) fn of(runs: &[SensorRun], cycles_per_rad: f64) -> Self {
         let periods: Vec<f64> = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU).collect();
         let least = periods.iter().copied().fold(f64::INFINITY, f64::min);
         let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
         let whole = runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS;
         let fifths = runs.len() == 1 && least > PERIODS_OF_ONE;
+        if !whole && !fifths && lacks_a_part(runs, cycles_per_rad) {
+            return Self { about_mean: true, ..Self::of_the_way(runs) };
+        }
         for (number, run) in runs.iter().enumerate() {
             let n = run.len();
             let width = (n / INTERLEAVED_BLOCKS).max(1);
@@ -100,6 +109,24 @@ impl Folds {
         Self { fold, block, count, blocks, about_mean: false }
     }
 
+    /// Fifths of the way that every run turns: rests, however long, are places.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below CONTIGUOUS_BLOCKS")]
+    pub(crate) fn of_the_way(runs: &[SensorRun]) -> Self {
+        let mut block = Vec::new();
+        for (number, run) in runs.iter().enumerate() {
+            let way = run.path_rad().max(f64::MIN_POSITIVE);
+            let steps = run.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs());
+            let gone = std::iter::once(0.0).chain(steps).scan(0.0, |gone, step| {
+                *gone += step;
+                Some(*gone / way)
+            });
+            let part = |share: f64| ((CONTIGUOUS_BLOCKS as f64 * share) as usize).min(CONTIGUOUS_BLOCKS - 1);
+            block.extend(gone.map(|share| number * CONTIGUOUS_BLOCKS + part(share)));
+        }
+        let fold = block.iter().map(|b| b % CONTIGUOUS_BLOCKS * FOLDS / CONTIGUOUS_BLOCKS).collect();
+        Self { fold, block, count: FOLDS, blocks: CONTIGUOUS_BLOCKS * runs.len(), about_mean: false }
+    }
+
     /// What a simpler model may be worse by: less where blocks are interleaved, and then as much as elsewhere if what is
     /// chosen so does not stand.
     pub(crate) fn tolerances(&self) -> &'static [Tolerance] {
@@ -117,6 +144,17 @@ impl Folds {
             })
             .collect()
     }
+}
+
+/// Whether one part of the period has no row, as where the last quarter of a turn is held out.
+fn lacks_a_part(runs: &[SensorRun], cycles_per_rad: f64) -> bool {
+    let place = |a: &f64| (a * cycles_per_rad / std::f64::consts::TAU).rem_euclid(1.0);
+    let mut places: Vec<f64> = runs.iter().flat_map(|r| r.reference_rad.iter().map(place)).collect();
+    places.sort_by(f64::total_cmp);
+    let around = places.first().zip(places.last()).map_or(1.0, |(first, last)| 1.0 + first - last);
+    let steps = places.windows(2).map(|w| w[1] - w[0]).chain([around]);
+    let [widest, next] = steps.fold([0.0; 2], |[a, b], step| if step > a { [step, a] } else { [a, step.max(b)] });
+    GAP.contains(&widest) && widest > ALONE * next
 }
 
 /// Squared errors of left-out rows, by block.

@@ -12,7 +12,7 @@ use super::rate_finding::rate_finding;
 use super::rate_runs;
 use super::readout::Kind;
 use super::report::{ByItself, Errors, Finding, Head, report};
-use super::samples::{SensorRun, apart, prepare};
+use super::samples::{Reading, SensorRun, apart, prepare};
 use super::screening::believed;
 use super::sensor::other_unit;
 use super::sensor_alone::alone;
@@ -25,7 +25,8 @@ use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
 use crate::identified::{Identification, Options, not_tried};
 use crate::model::hypothesis::Hypothesis;
-use crate::numerics::statistics::{median, span};
+use crate::numerics::angles::unwrapped;
+use crate::numerics::statistics::{line, median, span};
 use crate::recording::{Campaign, Instrument, Run, RunKind};
 use crate::report::gate::least_held_out;
 use crate::report::inference::{CONTRADICTS, covering};
@@ -65,6 +66,8 @@ const TIME_WAVES: usize = 4;
 const TURNS_FOR_WAVES: f64 = 1.5;
 /// Rows beyond which the decomposition and the jackknife look at every so many.
 const ENOUGH_ROWS: usize = 3000;
+/// Half a turn, rad, as it is measured: rows stand a little short of both its ends.
+const HALF_A_TURN: f64 = 0.99 * std::f64::consts::PI;
 
 /// Identifies a campaign that [`serves`].
 ///
@@ -113,7 +116,7 @@ pub(crate) fn identify(
     let (mut fitted, mut held) = apart(runs)?;
     let mut thermal = None;
     if !rate_gyroscope {
-        require_a_turn(&fitted, stated.unwrap_or(1.0), period)?;
+        require_a_turn([&fitted, &held], stated.unwrap_or(1.0), period)?;
         match Thermal::told(&fitted, stated, period, reference_c) {
             Told::Nothing => {}
             Told::Open(why) => left_out.push(why),
@@ -168,9 +171,14 @@ fn require_an_angle(campaign: &Campaign) -> Result<(), Refusal> {
     }
 }
 
-fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
-    let furthest = runs.iter().map(|r| r.travel_rad() * gain.abs()).fold(0.0, f64::max);
-    if furthest < std::f64::consts::PI {
+/// A sensor turns through half a turn in one run at least, of which a part may be held out.
+fn require_a_turn([runs, held]: [&[SensorRun]; 2], gain: f64, period: f64) -> Result<(), Refusal> {
+    let whole = |run: &SensorRun| {
+        let parts = [runs, held].into_iter().flatten().filter(|part| part.number == run.number);
+        span(&parts.flat_map(|part| part.reference_rad.iter().copied()).collect::<Vec<_>>())
+    };
+    let furthest = runs.iter().map(|run| whole(run) * gain.abs()).fold(0.0, f64::max);
+    if furthest < HALF_A_TURN {
         let name = runs.first().map_or("campaign", |r| r.name.as_str());
         return Err(Refusal::new(
             name,
@@ -184,20 +192,34 @@ fn require_a_turn(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refu
     Ok(())
 }
 
-/// An angle that hardly turns while its reference does is none of it: as a rule it is a rate.
-fn require_following(runs: &[SensorRun], gain: f64) -> Result<(), Refusal> {
-    let turned = |r: &&SensorRun| r.travel_rad();
-    let furthest = runs.iter().filter(|r| r.channels().is_none()).max_by(|a, b| turned(a).total_cmp(&turned(b)));
-    match furthest.filter(|r| r.travel_rad() * gain.abs() < std::f64::consts::PI) {
-        None => Ok(()),
-        Some(r) => Err(Refusal::no_answer(
-            &r.name,
-            format!("theta_deg does not follow the reference, which turns through {:.0}°", r.travel_rad().to_degrees()),
-            of_the_angle(r).unwrap_or_else(|| {
-                "the sensor's angle as theta_deg; of a rate gyroscope theta_deg = \"integral(COLUMN)\" in [columns] and period_deg = 360 in [campaign] of campaign.toml, without --sensor".into()
-            }),
-        )),
+/// How far an angle may turn, of what its gain asks for, and be of its reference.
+const FOLLOWING: std::ops::Range<f64> = 0.5..2.0;
+/// Steps of the reference, of the period, over which an angle is followed from row to row.
+const LARGEST_STEP: f64 = 0.125;
+
+/// An angle that hardly turns while its reference does is none of it: as a rule it is a rate, or in another unit.
+fn require_following(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
+    let travel = |run: &SensorRun| run.travel_rad() * gain.abs();
+    let furthest = runs.iter().filter(|r| r.channels().is_none()).max_by(|a, b| travel(a).total_cmp(&travel(b)));
+    let Some((run, Reading::Angle(theta))) = furthest.map(|run| (run, &run.reading)) else { return Ok(()) };
+    let slope = line(&run.reference_rad, &unwrapped(theta.iter().copied(), period)).0 / gain;
+    // rows in any order are not followed from one to the next
+    let mut steps: Vec<f64> = run.reference_rad.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
+    let is_followed = median(&mut steps) < LARGEST_STEP * period;
+    if travel(run) > HALF_A_TURN && (!is_followed || FOLLOWING.contains(&slope.abs())) {
+        return Ok(());
     }
+    Err(Refusal::no_answer(
+        &run.name,
+        format!(
+            "theta_deg does not follow the reference, which turns through {:.0}°: it turns {:.4} times as far as it should",
+            run.travel_rad().to_degrees(),
+            slope.abs()
+        ),
+        of_the_angle(run).unwrap_or_else(|| {
+            "the sensor's angle as theta_deg; of a rate gyroscope theta_deg = \"integral(COLUMN)\" in [columns] and period_deg = 360 in [campaign] of campaign.toml, without --sensor".into()
+        }),
+    ))
 }
 
 /// The raw angle turns, because the origin lies within what the channels draw.
@@ -295,7 +317,7 @@ fn sensor_finding(
     if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
         thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
     }
-    require_following(runs, model.sensor.gain)?;
+    require_following(runs, model.sensor.gain, period)?;
     let thinned = thinned(runs);
     let described = Described { model: &model, deviations: &deviations };
     let raw_turns = raw_turns(&model);

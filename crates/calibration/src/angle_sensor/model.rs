@@ -10,7 +10,7 @@ use super::rails::Rails;
 use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, centre, fit};
 use super::samples::SensorRun;
-use super::selection::{Selected, Selection, fit_from, starts};
+use super::selection::{Front, Selected, Selection, fit_from, starts};
 use super::sensor::Sensor;
 use super::table_fit::{Motion, Sample, Shape, TableFit};
 use super::{autoregression, ellipse};
@@ -121,13 +121,12 @@ impl SensorModel {
         starts: &[Readout],
     ) -> Option<Self> {
         let (front, shape) = &selected.model;
-        let readout = match front {
-            None => None,
-            Some((Kind::Plain, weighting, _)) => Some((Readout { rails, ..Readout::plain() }, *weighting)),
-            Some(front) => Some((fit_from(starts, rails, front, runs, sensor.gain)?.readout, front.1)),
+        let with = |front: &Front| match front {
+            (Kind::Plain, weighting, _) => Some((Readout { rails, ..Readout::plain() }, *weighting)),
+            _ => Some((fit_from(starts, rails, front, runs, sensor.gain)?.readout, front.1)),
         };
-        let samples = sensor.samples(runs, readout.as_ref().map(|r| &r.0));
-        let errors = by_run(&samples, runs.len(), |s| s.error);
+        let mut readout = front.as_ref().map_or(Some(None), |f| with(f).map(Some))?;
+        let mut samples = sensor.samples(runs, readout.as_ref().map(|r| &r.0));
         let raw_errors = by_run(&sensor.samples(runs, None), runs.len(), |s| s.error);
         let mut table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
         let mut predicted = selected.losses.rms();
@@ -135,17 +134,27 @@ impl SensorModel {
         let unknowns = readout.as_ref().map_or(0, |r| r.0.free().len()) + shape.size();
         let mut gain = autoregression::gain(&raw_errors, &left, unknowns);
         if gain <= 0.0
-            && let (Some((found, _)), Some(alone)) = (&readout, &selected.readout_alone)
-            && found.kind != Kind::Plain
+            && let Some((shape, losses)) = &selected.across_gaps
+        {
+            // where rows are dense and the sensor rests, memory follows any error; this is predicted where no memory reaches
+            table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
+            predicted = losses.rms();
+            gain = f64::MIN_POSITIVE;
+        }
+        if gain <= 0.0
+            && let Some((alone, losses)) = selected.readout_alone.as_ref().filter(|(f, _)| f.0 != Kind::Plain)
         {
             // what the memory of the noise explains as well is no table; a readout shows in the radius, too
-            let raw = Readout { rails: found.rails, ..Readout::plain() };
+            let (found, weighting) = with(alone)?;
+            let raw = Readout { rails, ..Readout::plain() };
             let ln_radius =
                 |readout: &Readout| -> Vec<_> { runs.iter().map(|r| circle::ln_radius(r, readout)).collect() };
+            samples = sensor.samples(runs, Some(&found));
+            let errors = by_run(&samples, runs.len(), |s| s.error);
             gain = autoregression::gain(&raw_errors, &errors, found.free().len())
-                + autoregression::gain(&ln_radius(&raw), &ln_radius(found), 0);
+                + autoregression::gain(&ln_radius(&raw), &ln_radius(&found), 0);
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
-            predicted = alone.rms();
+            (readout, predicted) = (Some((found, weighting)), losses.rms());
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();

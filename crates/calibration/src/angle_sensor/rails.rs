@@ -19,7 +19,7 @@ impl Rails {
     /// The rails that the readings of all runs show.
     pub(crate) fn of<'a>(readings: impl Iterator<Item = &'a [f64; 2]>) -> Self {
         let readings: Vec<[f64; 2]> = readings.copied().collect();
-        Self { limits: std::array::from_fn(|channel| rails(readings.iter().map(|z| z[channel]))) }
+        Self { limits: std::array::from_fn(|channel| rails(readings.iter().map(|z| [z[channel], z[1 - channel]]))) }
     }
 
     /// Which channels are at a rail.

@@ -213,9 +213,10 @@ fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
         model.predicted_raw.to_degrees()
     );
     let gain = model.gain.0;
-    let effect = |id: EffectId, origin, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
+    let effect = |id: EffectId, name: &str, unit: &str, value: f64, deviation: f64| EffectReport {
         id: id.description().id.into(),
-        origin,
+        // what may as well be nothing is undone for what it brings, and is no discovery
+        origin: if value.abs() > T_PARTS * deviation { Origin::Discovered } else { Origin::Empirical },
         parameters: vec![ParameterReport {
             name: name.into(),
             unit: unit.into(),
@@ -230,12 +231,10 @@ fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
     let terms = model.terms.iter().filter(|t| t.1 != 0.0);
     terms
         .filter_map(|&(term, value, deviation)| match term {
-            Term::Bias => {
-                Some(effect(EffectId::RateOffset, Origin::Discovered, "rate_offset", "rad/s", value, deviation))
-            }
+            Term::Bias => Some(effect(EffectId::RateOffset, "rate_offset", "rad/s", value, deviation)),
             Term::Lag => {
                 let (value, deviation) = (-value / gain, deviation / gain.abs());
-                Some(effect(EffectId::AngleLatency, Origin::Discovered, "latency", "s", value, deviation))
+                Some(effect(EffectId::AngleLatency, "latency", "s", value, deviation))
             }
             // the scale factor is k, and a run's own bias is no effect of the instrument
             Term::Scale | Term::BiasOf(_) | Term::Response => None,

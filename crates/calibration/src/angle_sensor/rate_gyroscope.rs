@@ -144,8 +144,9 @@ pub(super) fn splits(all: &[Stretch]) -> Vec<Split> {
     let mut out = Vec::new();
     for (number, run) in all.iter().enumerate() {
         let n = run.error.len();
-        for part in 0..PARTS {
-            let (from, to) = ((part * n).div_ceil(PARTS), ((part + 1) * n).div_ceil(PARTS));
+        let edges = run.edges(PARTS);
+        for part in edges.windows(2) {
+            let (from, to) = (part[0], part[1]);
             let others = all.iter().enumerate().filter(|(i, _)| *i != number).map(|(_, s)| s.clone());
             let around = [0..from, to..n].into_iter().filter(|r| r.len() > FEWEST_ROWS).map(|r| run.part(r));
             out.push(Split { train: others.chain(around).collect(), test: run.part(from..to) });

@@ -36,6 +36,10 @@ pub(crate) enum ErrorLaw {
 const REWEIGHTED: usize = 30;
 const SMALLEST_DEVIATION: f64 = 1e-2;
 
+/// Share of the way that one part of a run in time may hold: left out, one that held a turn between rests would take the scale factor
+/// with it.
+const MOST_OF_THE_WAY: f64 = 0.45;
+
 /// A stretch of a run: what is regressed on.
 #[derive(Debug, Clone)]
 pub(super) struct Stretch {
@@ -70,6 +74,33 @@ impl Stretch {
     pub(super) fn of(t: Vec<f64>, reference: Vec<f64>, error: Vec<f64>) -> Self {
         let none = vec![0.0; t.len()];
         Self { run: 0, t, reference, rate: none.clone(), acceleration: none, error }
+    }
+
+    /// First rows of so many parts, and the end of the last: alike in time, or, where one of them would hold most of the way that the
+    /// reference turns, each a share of the time and of the way in equal parts.
+    pub(super) fn edges(&self, parts: usize) -> Vec<usize> {
+        let rows = self.t.len();
+        let in_time: Vec<usize> = (0..=parts).map(|part| (part * rows).div_ceil(parts)).collect();
+        let shares = |values: &[f64]| -> Vec<f64> {
+            let steps = values.windows(2).map(|w| (w[1] - w[0]).abs());
+            let total = steps.clone().sum::<f64>().max(f64::MIN_POSITIVE);
+            steps.map(|s| s / total).collect()
+        };
+        let (time, way) = (shares(&self.t), shares(&self.reference));
+        let holds = |part: &[usize]| way[part[0].min(way.len())..part[1].min(way.len())].iter().sum::<f64>();
+        if in_time.windows(2).all(|part| holds(part) < MOST_OF_THE_WAY) {
+            return in_time;
+        }
+        let mut gone = 0.0;
+        let mut edges = vec![0];
+        for (at, (t, a)) in time.iter().zip(&way).enumerate() {
+            gone += 0.5 * (t + a);
+            while edges.len() < parts && gone * parts as f64 >= edges.len() as f64 {
+                edges.push(at + 1);
+            }
+        }
+        edges.resize(parts + 1, rows);
+        edges
     }
 
     pub(super) fn part(&self, rows: std::ops::Range<usize>) -> Self {

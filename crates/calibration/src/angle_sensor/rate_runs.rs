@@ -1,6 +1,8 @@
 //! Which runs of a rate gyroscope can be believed, each by itself and beside the others, and where in a run its angle and its
 //! reference part by what neither bias, scale factor nor lag makes.
 
+use std::ops::Range;
+
 use super::samples::{Reading, SensorRun};
 use crate::error::Refusal;
 use crate::numerics::angles::unwrapped;
@@ -10,8 +12,12 @@ use crate::report::gate::unit;
 
 /// Share of the runs that may be left out.
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
-/// Scale factors of one gyroscope are within this share of each other.
+/// Scale factors of one gyroscope are within this share of each other, and within so many deviations of what one run tells of it:
+/// other axes that turn with it and a random walk go into a run that turns little.
 const SHARE: f64 = 0.05;
+const DEVIATIONS: f64 = 3.0;
+/// Parts of a run that tell a scale factor each.
+const PARTS: usize = 5;
 /// Rates are one value within this share of the fastest; a range ends where so many rows stand there …
 const SAME_RATE: f64 = 1e-6;
 const ROWS_AT_THE_END: usize = 5;
@@ -45,8 +51,10 @@ pub(super) fn believed(
             "t_s in seconds: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map); or rows closer together",
         ));
     }
-    let gains: Vec<Option<f64>> = runs.iter().map(|run| gain(run, period)).collect();
-    let mut told: Vec<f64> = gains.iter().flatten().copied().collect();
+    let gains: Vec<Option<[f64; 2]>> = runs.iter().map(|run| gain(run, period)).collect();
+    // a run that rests tells none
+    let is_told = |[_, deviation]: &&[f64; 2]| DEVIATIONS * deviation < 0.5 * scale.abs();
+    let mut told: Vec<f64> = gains.iter().flatten().filter(is_told).map(|[gain, _]| *gain).collect();
     let common = if told.is_empty() { scale } else { median(&mut told) };
     if !(0.5..2.0).contains(&(common / scale).abs()) {
         return Err(Refusal::no_answer(
@@ -57,9 +65,12 @@ pub(super) fn believed(
             unit(common, Some(scale)).unwrap_or("rates in deg/s, angles in deg and times in s"),
         ));
     }
-    let why = |(run, gain): (&SensorRun, &Option<f64>)| {
+    let why = |(run, gain): (&SensorRun, &Option<[f64; 2]>)| {
         end_of_range(run, period).or_else(|| {
-            let gain = gain.filter(|gain| (gain / common - 1.0).abs() > SHARE)?;
+            let is_odd = |[gain, deviation]: &[f64; 2]| {
+                (gain - common).abs() > (SHARE * common.abs()).max(DEVIATIONS * deviation)
+            };
+            let [gain, _] = gain.filter(is_odd)?;
             Some(format!(
                 "its angle turns {gain:.4} times as far as the reference, that of the other runs {common:.4} times"
             ))
@@ -92,21 +103,33 @@ fn steps(run: &SensorRun) -> Option<Vec<f64>> {
     Some(angle(run)?.windows(2).map(|w| (w[1] - w[0]).abs()).collect()).filter(|steps: &Vec<f64>| !steps.is_empty())
 }
 
-/// Scale factor of one run beside a bias of its own; none where they are not told apart.
-fn gain(run: &SensorRun, period: f64) -> Option<f64> {
+/// Scale factor of one run beside a bias of its own, and its standard deviation by how those of its parts scatter; none where
+/// scale factor and bias are not told apart.
+fn gain(run: &SensorRun, period: f64) -> Option<[f64; 2]> {
     let theta = &followed(run, period)?;
-    let n = run.len() as f64;
-    let middle = |v: &[f64]| v.iter().sum::<f64>() / n;
-    let middles = [middle(&run.reference_rad), middle(&run.t_s), middle(theta)];
-    let mut equations = NormalEquations::new(2);
-    let mut moments = [0.0; 3];
-    for ((a, t), theta) in run.reference_rad.iter().zip(&run.t_s).zip(theta) {
-        let (a, t) = (a - middles[0], t - middles[1]);
-        equations.add(&[a, t], theta - middles[2]);
-        moments = [moments[0] + a * a, moments[1] + a * t, moments[2] + t * t];
+    let of = |rows: Range<usize>| -> Option<[f64; 2]> {
+        let (reference, t_s, theta) = (&run.reference_rad[rows.clone()], &run.t_s[rows.clone()], &theta[rows]);
+        let middle = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let middles = [middle(reference), middle(t_s), middle(theta)];
+        let mut equations = NormalEquations::new(2);
+        let mut moments = [0.0; 3];
+        for ((a, t), theta) in reference.iter().zip(t_s).zip(theta) {
+            let (a, t) = (a - middles[0], t - middles[1]);
+            equations.add(&[a, t], theta - middles[2]);
+            moments = [moments[0] + a * a, moments[1] + a * t, moments[2] + t * t];
+        }
+        let beside_a_line = 1.0 - moments[1].powi(2) / (moments[0] * moments[2]).max(f64::MIN_POSITIVE);
+        let told = moments[0] > 0.0 && beside_a_line > TOLD_FROM_A_LINE;
+        told.then(|| [equations.solve()[0], moments[0] * beside_a_line])
+    };
+    let [gain, _] = of(0..run.len()).filter(|[gain, _]| *gain != 0.0)?;
+    let part = |number: usize| number * run.len() / PARTS..(number + 1) * run.len() / PARTS;
+    let (mut information, mut scatter) = (f64::MIN_POSITIVE, 0.0);
+    for [own, weight] in (0..PARTS).map(part).filter(|rows| rows.len() > 2).filter_map(of) {
+        information += weight;
+        scatter += (weight * (own - gain)).powi(2);
     }
-    let beside_a_line = 1.0 - moments[1].powi(2) / (moments[0] * moments[2]).max(f64::MIN_POSITIVE);
-    (moments[0] > 0.0 && beside_a_line > TOLD_FROM_A_LINE).then(|| equations.solve()[0]).filter(|gain| *gain != 0.0)
+    Some([gain, scatter.sqrt() / information])
 }
 
 /// Says that the rate stands at one value while the reference turns faster, where it does.

@@ -19,7 +19,6 @@ use super::samples::{Reading, SensorRun};
 use super::sensor::Sensor;
 use super::table_fit::{Motion, Sample, Shape, TableFit};
 use crate::model::angle_table::Form;
-use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::median;
 
 /// Lengths of the table that are offered: nested, so that the order of trial has no say.
@@ -32,6 +31,12 @@ const ORDER_BESIDE_LINES: usize = 12;
 /// Observations for each unknown, an engineering choice. A row observes the angle, and of two channels the radius too: 27
 /// stations allow a table of four harmonics, and eight a readout's offset, gain and skew.
 const OBSERVATIONS_PER_UNKNOWN: usize = 3;
+/// … or so many, where what is predicted is off by less than this share of what the largest model within the former leaves: a deviation
+/// card of ten headings tells two harmonics where they are most of what there is.
+const FEWEST_PER_UNKNOWN: usize = 2;
+const FAR_BETTER: f64 = 1.0 / 3.0;
+/// … and across gaps by less than this share of the sensor as it is: half of what noise with a memory is, no table of it predicts.
+const BETTER_ACROSS_GAPS: f64 = 0.5;
 /// Stations for each coefficient of a table and its constant, an engineering choice: a few more than would be met exactly. 12 stations
 /// allow four harmonics of the six that they resolve.
 const STATIONS_PER_UNKNOWN: f64 = 1.3;
@@ -50,7 +55,9 @@ pub(crate) const VARYING_RATE: f64 = 0.02;
 const ONE_SPEED: f64 = 0.1;
 /// Rows in a row whose rate is a difference over a turn: the one at which it turns back and those beside it.
 const ROWS_OF_A_TURN: usize = 3;
-/// A motion of which less than this share, in power, is no function of the position is not told from it.
+/// Parts of a period in which a motion is compared, and the share of its variance, between passes through the same part, from which on
+/// it is told from the position.
+const DIRECTIONS_OF_MOTION: usize = 72;
 const LEAST_OF_ITS_OWN: f64 = 1e-2;
 
 /// A readout as it is fitted: what the library has of it, how angle and radius count, and which effects as text are there.
@@ -63,10 +70,12 @@ pub(crate) type Model = (Option<Front>, Shape);
 pub(crate) struct Selected {
     pub(crate) model: Model,
     pub(crate) losses: Losses,
-    /// those of its readout without a table
-    pub(crate) readout_alone: Option<Losses>,
+    /// the readout that is chosen where there is no table, and its losses
+    pub(crate) readout_alone: Option<(Front, Losses)>,
     /// those of the sensor as it is
     pub(crate) raw: Option<Losses>,
+    /// the table beside this readout that predicts fifths of the way that it has not seen, where no memory of noise reaches
+    pub(crate) across_gaps: Option<(Shape, Losses)>,
 }
 
 /// The data of a selection, with readouts fitted without each fold kept.
@@ -121,19 +130,54 @@ impl<'a> Selection<'a> {
         let raw = self.losses_of(&plain, &constant);
         let motions = self.motions(first);
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
+        self.without_barely_carried(&mut pool);
         let of_the_library: Vec<_> = pool.iter().filter(|c| c.texts == 0).cloned().collect();
         // an effect as text that is not chosen has no say in what is
         let best = |t: &Tolerance| choose(&pool, *t).filter(|c| c.texts > 0).or(choose(&of_the_library, *t)).cloned();
         let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(best).collect();
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
+        let readout_alone = |among: &[Candidate<Model>]| {
+            let without_table: Vec<_> = among.iter().filter(|c| c.model.1 == constant).cloned().collect();
+            choose(&without_table, Tolerance::One).and_then(|c| Some((c.model.0.clone()?, c.losses.clone())))
+        };
         let with_lines = |c: Candidate<Model>| {
+            let readout_alone = readout_alone(if c.texts > 0 { &pool } else { &of_the_library });
             let short = short_beside(&c, &pool).map(|short| self.with_lines(short));
             let long = self.with_lines(c);
             let Candidate { model, losses, .. } =
                 short.filter(|short| short.losses.rms() <= long.losses.rms()).unwrap_or(long);
-            Selected { readout_alone: self.losses_of(&model.0, &constant), raw: raw.clone(), model, losses }
+            let across_gaps = self.across_gaps(&model);
+            Selected { readout_alone, raw: raw.clone(), model, losses, across_gaps }
         };
         chosen.into_iter().map(with_lines).collect()
+    }
+
+    /// The table that predicts fifths of the way of each run, left out as a whole, far better than the sensor as it is does: the one that
+    /// was chosen, or the best.
+    fn across_gaps(&self, (front, chosen): &Model) -> Option<(Shape, Losses)> {
+        let folds = Folds::of_the_way(&self.runs);
+        let samples = |readout: Option<&Readout>| self.sensor.samples(&self.runs, readout);
+        let without: Vec<Vec<Sample>> = (0..folds.count)
+            .map(|fold| match front {
+                None => Some(samples(None)),
+                Some((Kind::Plain, ..)) => Some(samples(Some(&Readout::plain()))),
+                Some(front) => Some(samples(Some(&self.fit_readout(front, &folds.without(&self.runs, fold))?.readout))),
+            })
+            .collect::<Option<_>>()?;
+        let raw = samples(front.as_ref().map(|_| Readout::plain()).as_ref());
+        let (runs, cycles, constant) = (self.runs.len(), self.sensor.cycles, Shape::constant(self.sensor.free_gain));
+        let raw = cross_validate(|_| Some(raw.as_slice()), &folds, &constant, runs, cycles)?.rms();
+        let of =
+            |shape: &Shape| cross_validate(|fold| without.get(fold).map(Vec::as_slice), &folds, shape, runs, cycles);
+        if let Some(losses) = of(chosen).filter(|losses| losses.rms() < FAR_BETTER * raw) {
+            return Some((chosen.clone(), losses));
+        }
+        let shapes = self.shapes(&ORDERS, &[chosen.motion], &[]);
+        let carried = shapes.into_iter().filter(|shape| self.rows_carry(front, shape, OBSERVATIONS_PER_UNKNOWN));
+        let all: Vec<_> = carried.filter_map(|shape| Some((of(&shape)?, shape))).collect();
+        let best = all.into_iter().min_by(|a, b| a.0.rms().total_cmp(&b.0.rms()).then_with(|| a.1.cmp(&b.1)));
+        best.filter(|(losses, shape)| shape.order > 0 && losses.rms() < BETTER_ACROSS_GAPS * raw)
+            .map(|(losses, shape)| (shape, losses))
     }
 
     /// A model with the isolated lines that it leaves.
@@ -228,9 +272,11 @@ impl<'a> Selection<'a> {
         if both && self.turns_at_one_speed(&rates) {
             return self.motion_among(front, &all);
         }
-        all.push(Motion::Rate);
-        if self.is_told_from_position(|s| s.acceleration) {
-            all.push(Motion::RateAndAcceleration);
+        if self.is_told_from_position(|s| s.rate) {
+            all.push(Motion::Rate);
+            if self.is_told_from_position(|s| s.acceleration) {
+                all.push(Motion::RateAndAcceleration);
+            }
         }
         self.motion_among(front, &all)
     }
@@ -252,28 +298,26 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// Whether a motion is more than a function of the position: an acceleration is none where a swing is harmonic and stays within
-    /// a turn.
+    /// Whether a motion is more than a function of the position: where a position is met again, it is another. In one pass, and in a
+    /// harmonic swing within a turn, it is not, and what follows it a table explains as well.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
     fn is_told_from_position(&self, motion: impl Fn(&Sample) -> f64) -> bool {
         let samples = self.sensor.samples(&self.runs, None);
-        let constants = self.runs.len();
-        let row = |s: &Sample| {
-            let mut row = vec![0.0; constants + 2 * MOTION_ORDERS[0] + 1];
-            row[s.run] = 1.0;
-            let angle = self.sensor.cycles * self.sensor.gain * s.reference;
-            for n in 1..=MOTION_ORDERS[0] {
-                let (sin, cos) = (n as f64 * angle).sin_cos();
-                (row[constants + 2 * n - 2], row[constants + 2 * n - 1]) = (cos, sin);
-            }
-            row[constants + 2 * MOTION_ORDERS[0]] = if self.sensor.free_gain { s.reference } else { 0.0 };
-            row
+        let place = |s: &Sample| {
+            let periods = self.sensor.cycles * self.sensor.gain * s.reference / std::f64::consts::TAU;
+            (periods.rem_euclid(1.0) * DIRECTIONS_OF_MOTION as f64) as usize % DIRECTIONS_OF_MOTION
         };
-        let mut equations = NormalEquations::new(constants + 2 * MOTION_ORDERS[0] + 1);
-        samples.iter().for_each(|s| equations.add(&row(s), motion(s)));
-        let x = equations.solve();
-        let left = |s: &Sample| motion(s) - row(s).iter().zip(&x).map(|(a, b)| a * b).sum::<f64>();
-        let power = |of: &dyn Fn(&Sample) -> f64| samples.iter().map(|s| of(s).powi(2)).sum::<f64>();
-        power(&left) > LEAST_OF_ITS_OWN * power(&motion)
+        // of every pass through a part of the period how many rows it has, and the sum of their motion
+        let mut passes: Vec<Vec<[f64; 2]>> = vec![Vec::new(); DIRECTIONS_OF_MOTION];
+        for pass in samples.chunk_by(|a, b| a.run == b.run && place(a) == place(b)) {
+            passes[place(&pass[0])].push([pass.len() as f64, pass.iter().map(&motion).sum()]);
+        }
+        let about_mean = |passes: &[[f64; 2]]| {
+            let [rows, sum] = passes.iter().fold([0.0; 2], |[n, s], [rows, sum]| [n + rows, s + sum]);
+            passes.iter().map(|[n, s]| n * (s / n - sum / rows).powi(2)).sum::<f64>()
+        };
+        let rows: Vec<[f64; 2]> = samples.iter().map(|s| [1.0, motion(s)]).collect();
+        passes.iter().map(|passes| about_mean(passes)).sum::<f64>() > LEAST_OF_ITS_OWN * about_mean(&rows)
     }
 
     fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {
@@ -293,19 +337,14 @@ impl<'a> Selection<'a> {
         let missing: Vec<_> = fronts.iter().filter(|f| !self.without.contains_key(f)).cloned().collect();
         let fitted: Vec<_> = missing.into_par_iter().map(|f| (f.clone(), self.fit_without_each_fold(&f))).collect();
         self.without.extend(fitted);
-        let rows: usize = self.runs.iter().map(SensorRun::len).sum();
-        let constant = Shape::constant(self.sensor.free_gain).size();
         let pairs: Vec<(&Option<Front>, &Shape)> =
             fronts.iter().flat_map(|f| shapes.iter().map(move |s| (f, s))).collect();
         pairs
             .into_par_iter()
             .filter_map(|(front, shape)| {
                 let of_texts = unknowns_of_texts(texts_of(front));
-                let of_readout = front.as_ref().map_or(0, |f| f.0.free().len()) + of_texts;
-                let size = of_readout + shape.size();
-                if !stations_carry(self.stations, shape.order)
-                    || !carries(rows, of_readout, shape.size() - constant, self.runs.len() + constant)
-                {
+                let size = of_readout(front) + shape.size();
+                if !stations_carry(self.stations, shape.order) || !self.rows_carry(front, shape, FEWEST_PER_UNKNOWN) {
                     return None;
                 }
                 let WithoutFolds { samples, of_radius } = self.without.get(front)?.as_ref()?;
@@ -316,6 +355,19 @@ impl<'a> Selection<'a> {
                 Some(Candidate { size, texts, model, losses, of_radius: of_radius.clone() })
             })
             .collect()
+    }
+
+    fn rows_carry(&self, front: &Option<Front>, shape: &Shape, per_unknown: usize) -> bool {
+        let rows: usize = self.runs.iter().map(SensorRun::len).sum();
+        let constant = Shape::constant(self.sensor.free_gain).size();
+        carries(rows, of_readout(front), shape.size() - constant, self.runs.len() + constant, per_unknown)
+    }
+
+    /// Without the models that more than a third of the rows go into, unless they are far better than all others.
+    fn without_barely_carried(&self, pool: &mut Vec<Candidate<Model>>) {
+        let is_carried = |c: &Candidate<Model>| self.rows_carry(&c.model.0, &c.model.1, OBSERVATIONS_PER_UNKNOWN);
+        let least = pool.iter().filter(|c| is_carried(c)).map(|c| c.losses.rms()).fold(f64::INFINITY, f64::min);
+        pool.retain(|c| is_carried(c) || c.losses.rms() < FAR_BETTER * least);
     }
 
     fn fit_without_each_fold(&self, front: &Option<Front>) -> Option<WithoutFolds> {
@@ -403,13 +455,13 @@ fn stations_carry(stations: usize, order: usize) -> bool {
 }
 
 /// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.
-fn carries(rows: usize, of_readout: usize, of_table: usize, constants: usize) -> bool {
-    let in_angle = (of_table + constants) * OBSERVATIONS_PER_UNKNOWN <= rows;
+fn carries(rows: usize, of_readout: usize, of_table: usize, constants: usize, per_unknown: usize) -> bool {
+    let in_angle = |each: usize| (of_table + constants) * each <= rows;
     let in_both = |each: usize| (of_readout + of_table + constants) * each <= 2 * rows;
     match (of_readout, of_table) {
-        (0, _) => in_angle,
+        (0, _) => in_angle(per_unknown),
         (_, 0) => in_both(OBSERVATIONS_PER_UNKNOWN),
-        _ => in_angle && in_both(OBSERVATIONS_BESIDE_A_READOUT),
+        _ => in_angle(OBSERVATIONS_PER_UNKNOWN) && in_both(OBSERVATIONS_BESIDE_A_READOUT),
     }
 }
 
@@ -427,6 +479,11 @@ fn short_beside(chosen: &Candidate<Model>, pool: &[Candidate<Model>]) -> Option<
 
 /// The channels as they are.
 const PLAIN: Front = (Kind::Plain, Weighting::Equal, Vec::new());
+
+/// Unknowns of a readout.
+fn of_readout(front: &Option<Front>) -> usize {
+    front.as_ref().map_or(0, |(kind, _, texts)| kind.free().len() + unknowns_of_texts(texts))
+}
 
 /// The effects as text of a readout.
 fn texts_of(front: &Option<Front>) -> &[EffectId] {
@@ -458,7 +515,7 @@ mod tests {
 
     #[test]
     fn rows_carry_as_many_unknowns_as_they_observe() {
-        let least = |of_readout, of_table| (0..).find(|rows| carries(*rows, of_readout, of_table, 1));
+        let least = |of_readout, of_table| (0..).find(|rows| carries(*rows, of_readout, of_table, 1, 3));
         let affine = Kind::Affine.free().len();
         assert_eq!([least(0, 8), least(affine, 0), least(affine, 8)], [Some(27), Some(8), Some(27)]);
     }

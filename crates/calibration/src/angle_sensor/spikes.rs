@@ -42,6 +42,10 @@ const BESIDE: usize = 4;
 /// … all but so many of which, damaged themselves, are off by less than this share of it. What lasts longer is no damage of a row.
 const LIKE_IT: usize = BESIDE - 1;
 const SOUND: f64 = 0.3;
+/// Parts of the turn that are told apart, and the share of those in which rows stand that may have damaged rows alone: where a sensor rests
+/// at a few positions and moves between them, the few rows that moved would be damaged beside all those that rested.
+const DIRECTIONS: usize = 100;
+const MOST_DIRECTIONS_LOST: f64 = 0.1;
 /// An angle leaps where the reference goes on in steps, of the angle, below this, rad.
 const LARGEST_STEP: f64 = 0.125 * TAU;
 
@@ -51,7 +55,7 @@ pub(super) fn without_spikes(runs: Vec<SensorRun>, period: f64, warnings: &mut V
     let sound = |run: SensorRun| {
         let damaged = in_rounds(&run, &rails, period);
         let count = damaged.iter().filter(|is| **is).count();
-        if count == 0 || count as f64 > MOST_LOST * run.len() as f64 {
+        if count == 0 || count as f64 > MOST_LOST * run.len() as f64 || empties_directions(&run, &damaged) {
             return run;
         }
         let what = match run.reading {
@@ -68,6 +72,19 @@ pub(super) fn without_spikes(runs: Vec<SensorRun>, period: f64, warnings: &mut V
         run.subset(&(0..run.len()).filter(|i| !damaged[*i]).collect::<Vec<_>>())
     };
     runs.into_iter().map(sound).collect()
+}
+
+/// Whether directions in which rows stand would have none left.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
+fn empties_directions(run: &SensorRun, damaged: &[bool]) -> bool {
+    let (mut met, mut sound) = ([false; DIRECTIONS], [false; DIRECTIONS]);
+    for (a, damaged) in run.reference_rad.iter().zip(damaged) {
+        let direction = (a.rem_euclid(TAU) / TAU * DIRECTIONS as f64) as usize % DIRECTIONS;
+        met[direction] = true;
+        sound[direction] |= !damaged;
+    }
+    let count = |of: &[bool]| of.iter().filter(|is| **is).count() as f64;
+    count(&met) - count(&sound) > MOST_DIRECTIONS_LOST * count(&met)
 }
 
 /// The damaged rows; some are alone only where others are out of the way.
@@ -308,6 +325,15 @@ mod tests {
                 assert_eq!(left(run), (0, vec![]), "{name}");
             }
         }
+        // a sensor that rests at four positions, and between them bends by what the rests do not tell
+        let mut rested = run(400, |i, _| {
+            let a = 0.25 * TAU * ((i / 100) as f64 + (i % 100).saturating_sub(90) as f64 / 10.0);
+            ellipse(a).map(|v| v + 0.3 * (2.0 * a).sin().powi(2))
+        });
+        rested.reference_rad = (0..400)
+            .map(|i| 0.25 * TAU * ((i / 100) as f64 + (i % 100_usize).saturating_sub(90) as f64 / 10.0))
+            .collect();
+        assert_eq!(left(&rested), (0, vec![]), "rested");
         let knocked = run(2000, |i, a| ellipse(a).map(|v| if (900..920).contains(&i) { v + 0.3 } else { v }));
         assert_eq!(left(&knocked), (0, vec![]));
     }

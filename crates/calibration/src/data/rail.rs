@@ -1,4 +1,5 @@
-//! The rail of a converter: the extreme value occurs far more often than the level beside it.
+//! The rail of a converter: the extreme value of a channel occurs far more often than the level beside it, and while it does
+//! the other channel moves. A station that is read again and again, or a rest, repeats both.
 
 use crate::recording::{Channel, Recording};
 
@@ -8,13 +9,16 @@ const LEAST_SHARE: f64 = 0.002;
 /// … and this many times as often as the next level. A sine dwells at its peak: its last two levels of equal width are
 /// occupied as √2 : 2 − √2, 2.4 times at most.
 const TIES_OVER_NEXT: usize = 4;
+/// Share of its range that the other channel moves by at a rail: an engineering choice, a twentieth of a radian to both sides of the
+/// peak, as where an eighth of a percent of the amplitude is cut off. Noise of a station that is read again and again is less.
+const LEAST_SWEEP: f64 = 0.05;
 
-/// The rails that a channel reaches, lower and upper; infinite where it reaches none.
-pub(crate) fn rails(values: impl Iterator<Item = f64>) -> [f64; 2] {
+/// The rails that a channel reaches, lower and upper, of its values and the other channel's; infinite where it reaches none.
+pub(crate) fn rails(values: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     let (mut lower, mut upper) = (Levels::default(), Levels::default());
-    for value in values {
-        lower.add(-value);
-        upper.add(value);
+    for [value, other] in values {
+        lower.add(-value, other);
+        upper.add(value, other);
     }
     [
         if lower.end_at_a_rail() { -lower.outermost.value } else { f64::NEG_INFINITY },
@@ -22,37 +26,62 @@ pub(crate) fn rails(values: impl Iterator<Item = f64>) -> [f64; 2] {
     ]
 }
 
-/// A value, and how often it occurs.
+/// A value, how often it occurs, and between what the other channel is then.
 #[derive(Clone, Copy)]
 struct Level {
     value: f64,
     count: usize,
+    other: Span,
 }
 
-/// The two largest levels of some values, and how many values there are.
+/// From the least to the largest of some values.
+#[derive(Clone, Copy)]
+struct Span {
+    least: f64,
+    largest: f64,
+}
+
+impl Span {
+    const EMPTY: Self = Self { least: f64::INFINITY, largest: f64::NEG_INFINITY };
+
+    #[inline]
+    fn with(self, value: f64) -> Self {
+        Self { least: self.least.min(value), largest: self.largest.max(value) }
+    }
+
+    fn width(self) -> f64 {
+        (self.largest - self.least).max(0.0)
+    }
+}
+
+/// The two largest levels of some values, how many values there are, and the range of the other channel.
 struct Levels {
     outermost: Level,
     next: Level,
     count: usize,
+    other: Span,
 }
 
 impl Default for Levels {
     fn default() -> Self {
-        let none = Level { value: f64::NEG_INFINITY, count: 0 };
-        Self { outermost: none, next: none, count: 0 }
+        let none = Level { value: f64::NEG_INFINITY, count: 0, other: Span::EMPTY };
+        Self { outermost: none, next: none, count: 0, other: Span::EMPTY }
     }
 }
 
 impl Levels {
     #[inline]
-    fn add(&mut self, value: f64) {
+    fn add(&mut self, value: f64, other: f64) {
         self.count += 1;
+        self.other = self.other.with(other);
+        let first = || Level { value, count: 1, other: Span::EMPTY.with(other) };
         if value > self.outermost.value {
-            self.next = std::mem::replace(&mut self.outermost, Level { value, count: 1 });
+            self.next = std::mem::replace(&mut self.outermost, first());
         } else if value == self.outermost.value {
             self.outermost.count += 1;
+            self.outermost.other = self.outermost.other.with(other);
         } else if value > self.next.value {
-            self.next = Level { value, count: 1 };
+            self.next = first();
         } else if value == self.next.value {
             self.next.count += 1;
         }
@@ -62,16 +91,19 @@ impl Levels {
     fn end_at_a_rail(&self) -> bool {
         let ties = self.outermost.count;
         let enough = ties >= FEWEST_TIES && ties as f64 >= LEAST_SHARE * self.count as f64;
+        let swept = self.outermost.other.width() > LEAST_SWEEP * self.other.width();
         // half of all rows at one value is a channel that does not move
-        enough && ties > TIES_OVER_NEXT * self.next.count.max(1) && 2 * ties < self.count
+        enough && swept && ties > TIES_OVER_NEXT * self.next.count.max(1) && 2 * ties < self.count
     }
 }
 
 /// Whether each row of a recording has a channel of the vibration in phase at a rail, by the channel's own values.
 pub(crate) fn rows_at_rails(recording: &Recording) -> Vec<bool> {
     let mut out = vec![false; recording.len()];
-    for values in [Channel::Xc, Channel::Yc].into_iter().filter_map(|c| recording.channel(c)) {
-        let [lower, upper] = rails(values.iter().copied());
+    let channels = [Channel::Xc, Channel::Yc].map(|c| recording.channel(c));
+    let [Some(x), Some(y)] = channels else { return out };
+    for (values, others) in [(x, y), (y, x)] {
+        let [lower, upper] = rails(values.iter().zip(others).map(|(v, o)| [*v, *o]));
         out.iter_mut().zip(values).for_each(|(out, v)| *out |= *v <= lower || *v >= upper);
     }
     out
@@ -81,9 +113,10 @@ pub(crate) fn rows_at_rails(recording: &Recording) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// A sine of amplitude 10 in whole steps, clipped at these levels.
-    fn clipped(lower: f64, upper: f64) -> Vec<f64> {
-        (0..5000).map(|i| (10.0 * (0.1 * f64::from(i)).sin()).clamp(lower, upper).round()).collect()
+    /// A sine of amplitude 10 in whole steps, clipped at these levels, and its cosine.
+    fn clipped(lower: f64, upper: f64) -> Vec<[f64; 2]> {
+        let row = |(sin, cos): (f64, f64)| [(10.0 * sin).clamp(lower, upper).round(), (10.0 * cos).round()];
+        (0..5000).map(|i| row((0.1 * f64::from(i)).sin_cos())).collect()
     }
 
     #[test]
@@ -95,8 +128,21 @@ mod tests {
         assert_eq!(rails(clipped(-5.0, 6.0).into_iter()), [-5.0, 6.0]);
         // a channel that hardly moves, and none
         assert_eq!(rails(clipped(-11.0, 0.0).into_iter()), open);
-        assert_eq!(rails(std::iter::repeat_n(3.0, 100)), open);
+        assert_eq!(rails(std::iter::repeat_n([3.0, 3.0], 100)), open);
         assert_eq!(rails(std::iter::empty()), open);
+    }
+
+    #[test]
+    fn stations_that_are_read_again_and_again_and_rests_are_no_rails() {
+        // fifty times each, the other channel by a count more or less; the first station is at the peak of x alone
+        let stations = (0..24).map(|n| (0.262 * f64::from(n)).sin_cos());
+        let rows = stations.flat_map(|(sin, cos)| {
+            (0..50).map(move |i| [(1000.0 * cos).round(), (1000.0 * sin).round() + f64::from(i % 3 - 1)])
+        });
+        let turned = rows.clone().map(|[x, y]| [y, x]);
+        for rows in [rows.collect::<Vec<_>>(), turned.collect()] {
+            assert_eq!(rails(rows.into_iter()), [f64::NEG_INFINITY, f64::INFINITY]);
+        }
     }
 
     #[test]
@@ -104,10 +150,10 @@ mod tests {
         let mut rows = clipped(-5.0, 6.0);
         rows.reverse();
         assert_eq!(rails(rows.iter().copied()), [-5.0, 6.0]);
-        rows.sort_by(f64::total_cmp);
+        rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
         assert_eq!(rails(rows.iter().copied()), [-5.0, 6.0]);
-        rows.extend([f64::NAN; 20]);
-        rows.extend([-f64::NAN; 20]);
+        rows.extend([[f64::NAN, f64::NAN]; 20]);
+        rows.extend([[-f64::NAN, f64::NAN]; 20]);
         assert_eq!(rails(rows.into_iter()), [-5.0, 6.0]);
     }
 }

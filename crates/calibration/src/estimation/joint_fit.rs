@@ -373,6 +373,28 @@ impl Dataset {
         (result, settled)
     }
 
+    /// Fits with Δω held where the quadrature balance has it, and then free from there, which is kept where the fit stays with it.
+    fn with_the_split_held(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Fit {
+        let mut hypothesis = hypothesis.clone();
+        self.split_is_held = true;
+        self.begin_with_the_balance(&mut hypothesis);
+        let mut held = self.fitted(&hypothesis, drive, Effort::FULL);
+        for _ in ROUNDS..MOST_ROUNDS {
+            if held.1 {
+                break;
+            }
+            held = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
+        }
+        let weighting = self.weighting();
+        self.split_is_held = false;
+        let (freed, _) = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
+        if self.contradicts_the_balance(&freed.hypothesis) {
+            self.weigh_by(&weighting);
+            return held.0;
+        }
+        freed
+    }
+
     fn weighting(&self) -> Weighting {
         Weighting {
             runs: self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect(),
@@ -562,10 +584,6 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         dataset.drive_is_free = dataset.tells_the_drive() && (dataset.drive_is_free_at_once || freed);
         let (result, settled) =
             dataset.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
-        if !dataset.split_is_held && dataset.contradicts_the_balance(&result.hypothesis) {
-            dataset.split_is_held = true;
-            continue;
-        }
         hypothesis = result.hypothesis.clone();
         round += 1;
         if !last || !(settled || round >= MOST_ROUNDS) {
@@ -585,6 +603,11 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             }
             dataset.weigh_by(&held);
         }
+        let result = if dataset.contradicts_the_balance(&result.hypothesis) {
+            dataset.with_the_split_held(&hypothesis, drive.as_ref())
+        } else {
+            result
+        };
         return Ok(Fitted { fit: result, ring_downs, drive, weighting: dataset.weighting() });
     }
 }
