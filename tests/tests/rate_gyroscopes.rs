@@ -559,10 +559,11 @@ fn runs_that_hardly_turn_are_not_of_another_gyroscope() {
 fn a_turn_between_rests_tells_the_scale_factor() {
     let mut noise = Noise::new(3);
     let (mut angle, mut walk) = (0.0, 0.0);
-    let rows: Vec<[f64; 3]> = (0..2000)
+    // the last quarter is held out
+    let rows: Vec<[f64; 3]> = (0..2700)
         .map(|i| {
             let t = 0.01 * f64::from(i);
-            angle += if (6.0..9.0).contains(&t) { 1.2 } else { 0.0 };
+            angle += if (4.2..7.2).contains(&t) { 1.2 } else { 0.01 * (3.0 * t).sin() };
             walk += 0.01 * noise.sample();
             [t, angle, 0.98 * angle + 0.1 * t + walk]
         })

@@ -148,7 +148,7 @@ impl Described<'_> {
             let p = vec![parameter("latency", "s", -side[0] / gain, d[0] / gain.abs())];
             let signature = EffectId::AngleLatency.description().signature;
             let evidence = format!("{signature}; {}", self.evidence());
-            effect(library_id(EffectId::AngleLatency), Origin::Discovered, p, evidence)
+            effect(library_id(EffectId::AngleLatency), self.model.origin_of_motion(), p, evidence)
         };
         match self.model.table.shape.motion {
             Motion::None => Vec::new(),
@@ -243,7 +243,7 @@ impl Described<'_> {
             }
             Motion::RateAndAcceleration if side[0] == 0.0 => {}
             Motion::Rate | Motion::RateAndAcceleration => {
-                admit(EffectId::AngleLatency, Origin::Discovered, [-side[0] / m.sensor.gain, 0.0, 0.0, 0.0]);
+                admit(EffectId::AngleLatency, m.origin_of_motion(), [-side[0] / m.sensor.gain, 0.0, 0.0, 0.0]);
             }
         }
         h.angle_table = (!m.table.table.cos.is_empty()).then(|| m.table.table.clone());

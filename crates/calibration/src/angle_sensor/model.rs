@@ -16,6 +16,7 @@ use super::table_fit::{Motion, Sample, Shape, TableFit};
 use super::{autoregression, ellipse};
 use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
+use crate::model::hypothesis::Origin;
 
 /// Rows of the last fit; more would not narrow what still means something.
 const ENOUGH_ROWS: usize = 100_000;
@@ -49,6 +50,8 @@ pub(crate) struct SensorModel {
     pub(crate) predicted_raw: Option<f64>,
     /// the reference was not believed: only the radius was
     pub(crate) by_radius: bool,
+    /// what goes with the motion is told from what goes with the position, for positions were met again at another
+    pub(crate) tells_motion: bool,
 }
 
 impl SensorModel {
@@ -159,8 +162,16 @@ impl SensorModel {
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();
         let helps = follows && predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
-        let model =
-            Self { sensor, outcome: Outcome::Answered, readout, table, predicted, predicted_raw, by_radius: false };
+        let model = Self {
+            sensor,
+            outcome: Outcome::Answered,
+            readout,
+            table,
+            predicted,
+            predicted_raw,
+            by_radius: false,
+            tells_motion: selected.tells_motion,
+        };
         Some(if helps { model } else { model.neutral(runs) })
     }
 
@@ -213,7 +224,13 @@ impl SensorModel {
             predicted: chosen.losses.rms(),
             predicted_raw: None,
             by_radius: true,
+            tells_motion: false,
         })
+    }
+
+    /// How a lag came in: where positions are not met again at another rate, it describes what goes with either.
+    pub(crate) fn origin_of_motion(&self) -> Origin {
+        if self.tells_motion { Origin::Discovered } else { Origin::Empirical }
     }
 
     /// The readout alone.

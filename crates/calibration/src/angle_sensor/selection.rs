@@ -59,6 +59,8 @@ const ROWS_OF_A_TURN: usize = 3;
 /// it is told from the position.
 const DIRECTIONS_OF_MOTION: usize = 72;
 const LEAST_OF_ITS_OWN: f64 = 1e-2;
+/// … where this share of the rows at least stand where others do in another pass: a turn ends where it began.
+const MET_AGAIN: f64 = 0.2;
 
 /// A readout as it is fitted: what the library has of it, how angle and radius count, and which effects as text are there.
 pub(crate) type Front = (Kind, Weighting, Vec<EffectId>);
@@ -76,6 +78,8 @@ pub(crate) struct Selected {
     pub(crate) raw: Option<Losses>,
     /// the table beside this readout that predicts fifths of the way that it has not seen, where no memory of noise reaches
     pub(crate) across_gaps: Option<(Shape, Losses)>,
+    /// what goes with the rate is told from what goes with the position
+    pub(crate) tells_motion: bool,
 }
 
 /// The data of a selection, with readouts fitted without each fold kept.
@@ -147,7 +151,8 @@ impl<'a> Selection<'a> {
             let Candidate { model, losses, .. } =
                 short.filter(|short| short.losses.rms() <= long.losses.rms()).unwrap_or(long);
             let across_gaps = self.across_gaps(&model);
-            Selected { readout_alone, raw: raw.clone(), model, losses, across_gaps }
+            let tells_motion = self.is_told_from_position(|s| s.rate);
+            Selected { readout_alone, raw: raw.clone(), model, losses, across_gaps, tells_motion }
         };
         chosen.into_iter().map(with_lines).collect()
     }
@@ -272,13 +277,26 @@ impl<'a> Selection<'a> {
         if both && self.turns_at_one_speed(&rates) {
             return self.motion_among(front, &all);
         }
-        if self.is_told_from_position(|s| s.rate) {
-            all.push(Motion::Rate);
-            if self.is_told_from_position(|s| s.acceleration) {
-                all.push(Motion::RateAndAcceleration);
-            }
+        if !self.is_told_from_position(|s| s.rate) {
+            return self.motion_beyond_position(front, &all);
+        }
+        all.push(Motion::Rate);
+        if self.is_told_from_position(|s| s.acceleration) {
+            all.push(Motion::RateAndAcceleration);
         }
         self.motion_among(front, &all)
+    }
+
+    /// A rate that is a function of the position, as in one pass: what a table of any length explains as well is the table's.
+    fn motion_beyond_position(&mut self, front: &Option<Front>, others: &[Motion]) -> Vec<Motion> {
+        let mut best = |motions: &[Motion]| {
+            let all = self.offer(std::slice::from_ref(front), &self.shapes(&ORDERS, motions, &[]));
+            best_by_angle(&all).map(|c| c.losses.clone())
+        };
+        match (best(others), best(&[Motion::Rate])) {
+            (Some(without), Some(with)) if with.is_better_than(&without) => vec![Motion::None, Motion::Rate],
+            _ => self.motion_among(front, others),
+        }
     }
 
     /// Whether the speed is one but for the rows at which it turns back, whose rates are differences over the turn.
@@ -291,6 +309,9 @@ impl<'a> Selection<'a> {
     }
 
     fn motion_among(&mut self, front: &Option<Front>, all: &[Motion]) -> Vec<Motion> {
+        if all.len() == 1 {
+            return all.to_vec();
+        }
         let trial = self.offer(std::slice::from_ref(front), &self.shapes(&MOTION_ORDERS, all, &[]));
         match choose(&trial, Tolerance::One).map(|c| c.model.1.motion) {
             None | Some(Motion::None) => vec![Motion::None],
@@ -317,7 +338,9 @@ impl<'a> Selection<'a> {
             passes.iter().map(|[n, s]| n * (s / n - sum / rows).powi(2)).sum::<f64>()
         };
         let rows: Vec<[f64; 2]> = samples.iter().map(|s| [1.0, motion(s)]).collect();
-        passes.iter().map(|passes| about_mean(passes)).sum::<f64>() > LEAST_OF_ITS_OWN * about_mean(&rows)
+        let again = passes.iter().filter(|passes| passes.len() > 1).flatten().map(|[rows, _]| rows).sum::<f64>();
+        again > MET_AGAIN * rows.len() as f64
+            && passes.iter().map(|passes| about_mean(passes)).sum::<f64>() > LEAST_OF_ITS_OWN * about_mean(&rows)
     }
 
     fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {
