@@ -5,7 +5,6 @@ use cvg_calibration::Identification;
 use cvg_calibration::recording::{Recording, Role, Run};
 use cvg_calibration::report::Status;
 use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, lines, run, sensor};
-use cvg_tests::bench::holds;
 
 /// Two channels at angles, a reading a second.
 fn read_at(angles: Vec<f64>, x: Vec<f64>, y: Vec<f64>, role: Role) -> Run {
@@ -640,26 +639,4 @@ fn an_angle_in_another_unit_beside_a_stated_gain_is_refused_and_the_unit_named()
     let refusal =
         cvg_calibration::identify(sensor(runs), &cvg_calibration::Options::default()).unwrap_err().to_string();
     assert!(refusal.contains("does not follow the reference") && refusal.contains("in rad"), "{refusal}");
-}
-
-/// Channels on a circle to their last digit whose angle is off by 12 harmonics, at stations that are read five times each: a gain and a
-/// cubic that a few stations ask for would leave the radius thirty times less round.
-#[test]
-fn a_readout_that_leaves_the_radius_less_round_is_none() {
-    let mut noise = Noise::new(2);
-    let mut at = |held: bool| {
-        let stations = (0..128).filter(|i| (i % 3 == 2) == held);
-        let angles: Vec<f64> = stations.flat_map(|i| std::iter::repeat_n(2.8125 * f64::from(i), 5)).collect();
-        let of = |a: &f64| {
-            let error = 0.05 * a.to_radians().cos()
-                + 0.35 * (12.0 * a).to_radians().cos()
-                + 0.3 * (14.0 * a).to_radians().sin();
-            let (sin, cos) = (a + error).to_radians().sin_cos();
-            ((1000.0 * cos).round(), (1000.0 * sin).round())
-        };
-        let (x, y) = angles.iter().map(of).unzip();
-        read_at(angles, x, y, role(held))
-    };
-    let i = identified(sensor(vec![at(false), at(true)]));
-    assert!(i.report.detection_gain_ratio.is_none_or(|ratio| holds(&ratio, 1.0)), "{:#?}", i.report.effects);
 }

@@ -104,3 +104,44 @@ fn largest_harmonic(sensor: &Sensor, runs: &[SensorRun]) -> Option<(usize, f64)>
     let largest = OF_A_READOUT.map(amplitude).into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
     largest.filter(|(_, size)| left < MOSTLY * with_a_line && *size < LARGEST * sensor.period)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle_sensor::samples::Reading;
+    use crate::numerics::statistics::remembered;
+    use crate::recording::Role;
+
+    /// Channels of this gain ratio, with noise of 3e-4.
+    fn channels(gain_ratio: f64) -> SensorRun {
+        let rows = 500_u32;
+        let noise = remembered(0.0, 2 * rows as usize, 7);
+        let at = |i: u32| std::f64::consts::TAU * f64::from(i) / 100.0;
+        let reading = |i: u32| {
+            let (sin, cos) = at(i).sin_cos();
+            [cos + 3e-4 * noise[2 * i as usize], gain_ratio * sin + 3e-4 * noise[2 * i as usize + 1]]
+        };
+        let t_s: Vec<f64> = (0..rows).map(f64::from).collect();
+        SensorRun {
+            name: "channels".into(),
+            number: 0,
+            role: Role::Fit,
+            commanded: false,
+            reference_rad: (0..rows).map(at).collect(),
+            rate_rad_s: vec![0.06; t_s.len()],
+            acceleration_rad_s2: vec![0.0; t_s.len()],
+            temp_c: None,
+            recorded: None,
+            reading: Reading::Channels((0..rows).map(reading).collect()),
+            t_s,
+        }
+    }
+
+    #[test]
+    fn a_readout_shows_where_the_radius_has_it_and_not_where_it_leaves_it_less_round() {
+        let mut readout = Readout { kind: super::super::readout::Kind::Affine, ..Readout::plain() };
+        readout.p[2] = 5e-3;
+        assert!(shows(&readout, &[channels(1.005)]));
+        assert!(!shows(&readout, &[channels(1.0)]));
+    }
+}

@@ -20,6 +20,7 @@ use super::table_fit::Sample;
 use super::thermal::{Thermal, Told};
 use super::units::{of_the_angle, of_the_reference, require_degrees};
 use super::whole_periods::in_any_order;
+use crate::data::held_reference::go_on_evenly;
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
@@ -97,6 +98,9 @@ pub(crate) fn identify(
     let across = cross_axis::take(&mut campaign);
     (options.progress)("preparing the runs");
     let mut left_out = Vec::new();
+    for run in campaign.runs.iter_mut().filter(|run| run.kind == RunKind::Rotation) {
+        left_out.extend(go_on_evenly(&mut run.recording));
+    }
     if rate_gyroscope {
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
     } else if scattered.is_none() {
@@ -209,12 +213,16 @@ fn require_following(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), R
     if travel(run) > HALF_A_TURN && (!is_followed || FOLLOWING.contains(&slope.abs())) {
         return Ok(());
     }
+    let turns = if travel(run) > HALF_A_TURN {
+        format!(": it turns {:.4} times as far as it should", slope.abs())
+    } else {
+        String::new()
+    };
     Err(Refusal::no_answer(
         &run.name,
         format!(
-            "theta_deg does not follow the reference, which turns through {:.0}°: it turns {:.4} times as far as it should",
-            run.travel_rad().to_degrees(),
-            slope.abs()
+            "theta_deg does not follow the reference, which turns through {:.0}°{turns}",
+            run.travel_rad().to_degrees()
         ),
         of_the_angle(run).unwrap_or_else(|| {
             "the sensor's angle as theta_deg; of a rate gyroscope theta_deg = \"integral(COLUMN)\" in [columns] and period_deg = 360 in [campaign] of campaign.toml, without --sensor".into()

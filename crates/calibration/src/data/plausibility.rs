@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use crate::data::copies;
+use crate::data::held_reference;
 use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
 use crate::data::rate_spikes;
@@ -55,6 +56,7 @@ const FEWEST_COMMANDS: usize = 50;
 pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let mut findings = Findings::default();
     let name = recording.source.display().to_string();
+    findings.warnings.extend(held_reference::go_on_evenly(recording));
     rate_spikes::leave_out(recording, &name, &mut findings.warnings);
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
