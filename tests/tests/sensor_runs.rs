@@ -234,3 +234,42 @@ fn one_run_that_is_not_like_the_others_is_left_out_with_what_is_odd_about_it() {
         assert!((own.value.abs() - 2.0).abs() < 1e-4 && own.half_width() < 1e-4, "{own:?}");
     }
 }
+
+/// Thirty rows of one run repeat the row before, in all channels or in the angle, while the table turns on: a fit of all of them left
+/// 0.10° of 0.02° of noise, and a held-out run with them 0.66°.
+#[test]
+fn rows_that_stand_still_while_the_table_turns_are_named_and_left_out() {
+    let frozen = |mut recording: Recording| {
+        let all = [&mut recording.xc_v, &mut recording.yc_v, &mut recording.theta_deg];
+        all.into_iter().flatten().for_each(|values| {
+            let last = values[699];
+            values[700..730].fill(last);
+        });
+        recording
+    };
+    let as_angle = |recording: Recording| {
+        let (x, y) = (recording.xc_v.unwrap(), recording.yc_v.unwrap());
+        let theta = x.iter().zip(&y).map(|(x, y)| y.atan2(*x).to_degrees()).collect();
+        Recording { theta_deg: Some(theta), xc_v: None, yc_v: None, ..recording }
+    };
+    for angle in [false, true] {
+        let read = |rate: f64, seed: u64| {
+            let recording = recorded(BUILT, rate, 1.0, seed);
+            if angle { as_angle(recording) } else { recording }
+        };
+        let runs = |of_fit: &dyn Fn(Recording) -> Recording, of_held: &dyn Fn(Recording) -> Recording| {
+            vec![
+                run("a.csv", Role::Fit, of_fit(read(60.0, 1))),
+                run("b.csv", Role::Fit, read(-60.0, 2)),
+                run("c.csv", Role::Holdout, of_held(read(45.0, 3))),
+            ]
+        };
+        let sound = held_out(&of_runs(runs(&|r| r, &|r| r)));
+        for damaged in [runs(&frozen, &|r| r), runs(&|r| r, &frozen)] {
+            let i = of_runs(damaged);
+            assert!(held_out(&i) < 1.1 * sound, "{angle}: {}° of {sound}°", held_out(&i));
+            let named = i.report.warnings.iter().any(|w| w.contains("rows 701 to 730"));
+            assert!(named, "{angle}: {:#?}", i.report.warnings);
+        }
+    }
+}

@@ -21,6 +21,7 @@ use super::thermal::{Thermal, Told};
 use super::units::{of_the_angle, of_the_reference, require_degrees};
 use super::whole_periods::in_any_order;
 use crate::data::held_reference::go_on_evenly;
+use crate::data::plausibility::without_frozen_rows;
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
@@ -100,6 +101,9 @@ pub(crate) fn identify(
     let mut left_out = Vec::new();
     for run in campaign.runs.iter_mut().filter(|run| run.kind == RunKind::Rotation) {
         left_out.extend(go_on_evenly(&mut run.recording));
+        if !rate_gyroscope {
+            left_out.extend(without_frozen_rows(&mut run.recording));
+        }
     }
     if rate_gyroscope {
         campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));

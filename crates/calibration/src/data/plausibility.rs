@@ -120,6 +120,27 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     findings
 }
 
+/// Leaves out of a sensor's recording the few stretches in which its values stand still while the table turns, and says so. Many of
+/// them are the digits of a coarse sensor.
+pub(crate) fn without_frozen_rows(recording: &mut Recording) -> Option<String> {
+    let rows = recording.len();
+    let held = held_at_once(recording, &columns_of_the_angle(recording)).into_iter();
+    let held: Vec<Range<usize>> = held.filter(|r| r.len() >= HELD_ALONE).collect();
+    let lost: usize = held.iter().map(Range::len).sum();
+    if lost == 0 || held.len() >= FEWEST_AGES || lost as f64 > MOST_LOST * rows as f64 {
+        return None;
+    }
+    let said = format!(
+        "{}: values stand still while the table turns: {}; these {lost} rows are left out",
+        recording.source.display(),
+        places(&recording.t_s, &held)
+    );
+    let mut frozen = vec![false; rows];
+    held.into_iter().for_each(|r| frozen[r].fill(true));
+    leave_out(recording, &frozen);
+    Some(said)
+}
+
 /// Where these rows are, by number and time: the longest stretches, and how many more there are.
 pub(crate) fn places(t: &[f64], rows: &[Range<usize>]) -> String {
     let place =
@@ -135,18 +156,11 @@ pub(crate) fn places(t: &[f64], rows: &[Range<usize>]) -> String {
 /// or in the table's own.
 pub(crate) fn held_rows(recording: &Recording) -> Vec<Range<usize>> {
     let rows = recording.len();
-    let angle: Vec<Column<'_>> = [Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys, Channel::Theta]
-        .into_iter()
-        .filter_map(|c| Column::new(recording.channel(c)?, (c == Channel::Theta).then_some(180.0)))
-        .collect();
+    let angle = columns_of_the_angle(recording);
     let table = recording.table_deg.as_deref().and_then(|v| Column::new(v, Some(360.0)));
     let mut held = vec![false; rows];
-    let input = Input::of(recording);
     let mut mark = |ranges: Vec<Range<usize>>| ranges.into_iter().for_each(|r| held[r].fill(true));
-    if !angle.is_empty() {
-        let all = repeats(rows, |i| angle.iter().all(|c| c.repeats(i)));
-        mark(all.into_iter().filter(|r| input.turns(r) && caught_up(angle.iter(), r, rows)).collect());
-    }
+    mark(held_at_once(recording, &angle));
     let main: Vec<&Column<'_>> = angle.iter().filter(|c| c.is_main).collect();
     for (at, column) in main.iter().enumerate() {
         let moves = |r: &Range<usize>| {
@@ -165,6 +179,21 @@ pub(crate) fn held_rows(recording: &Recording) -> Vec<Range<usize>> {
         mark(stuck.filter(|r| moves(r) && caught_up(std::iter::once(&table), r, rows)).collect());
     }
     repeats(rows, |i| held[i])
+}
+
+fn columns_of_the_angle(recording: &Recording) -> Vec<Column<'_>> {
+    let columns = [Channel::Xc, Channel::Xs, Channel::Yc, Channel::Ys, Channel::Theta].into_iter();
+    columns.filter_map(|c| Column::new(recording.channel(c)?, (c == Channel::Theta).then_some(180.0))).collect()
+}
+
+/// Rows that say what the row before says, in all of these columns, although the table turned.
+fn held_at_once(recording: &Recording, angle: &[Column<'_>]) -> Vec<Range<usize>> {
+    if angle.is_empty() {
+        return Vec::new();
+    }
+    let (rows, input) = (recording.len(), Input::of(recording));
+    let all = repeats(rows, |i| angle.iter().all(|c| c.repeats(i)));
+    all.into_iter().filter(|r| input.turns(r) && caught_up(angle.iter(), r, rows)).collect()
 }
 
 /// One column and the size of its small steps.
