@@ -416,6 +416,30 @@ fn a_run_of_another_encoder_is_left_out() {
     }
 }
 
+/// Of two runs nothing tells which is the odd one: that they contradict each other is said, and of runs there and back at unlike stations
+/// of one encoder with play it is not.
+#[test]
+fn two_runs_of_two_encoders_contradict_each_other() {
+    let mut noise = Noise::new(4);
+    let mut at = |foreign: bool, step: f64, role| {
+        let theta = |degrees: f64| {
+            let a = degrees.to_radians();
+            let own = if foreign { 0.6 * (3.0 * a).cos() } else { 0.5 * a.sin() + 0.3 * (2.0 * a).cos() };
+            degrees + own + 0.05 * step.signum() + 0.02 * noise.sample()
+        };
+        angle_at((0..200).map(|i| step * f64::from(i)).collect(), theta, role)
+    };
+    let mut contradicted = |foreign: bool| {
+        let i = identified(sensor(vec![
+            at(false, 3.6, Role::Fit),
+            at(foreign, -3.7, Role::Fit),
+            at(false, 3.5, Role::Holdout),
+        ]));
+        i.report.warnings.iter().any(|w| w.contains("contradict each other"))
+    };
+    assert_eq!([false, true].map(&mut contradicted), [false, true]);
+}
+
 /// Two channels at evenly spaced stations of one turn, of which every third is held out: a gain ratio of 1.166, and
 /// `fourth` deg at four a turn.
 fn every_third_held(stations: u32, held: bool, fourth: f64, noise_v: f64, seed: u64) -> Run {

@@ -1,12 +1,12 @@
 //! A run of an angle sensor that does not fit what the others say: what the others show, undone, leaves it far worse than them. It is
-//! left out and named, with what is odd about it.
+//! left out and named, with what is odd about it. Of two runs nothing tells which is the odd one: that they contradict each other is said.
 
 use super::ellipse;
 use super::model::SensorModel;
 use super::samples::SensorRun;
 use crate::error::Refusal;
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, root_mean_square};
+use crate::numerics::statistics::{median, robust_deviation, root_mean_square};
 
 /// Runs from which on one can be odd, and the share of them that may be left out.
 const FEWEST_RUNS: usize = 3;
@@ -51,7 +51,46 @@ pub(super) fn without_odd_runs(
         (runs, model) = (found.rest, found.model);
         left_out += 1.0;
     }
+    if !model.by_radius
+        && let [one, other] = runs.as_slice()
+    {
+        warnings.extend(contradiction([one, other], &model, &identify));
+    }
     Ok((runs, model))
+}
+
+/// Two runs that contradict each other: by itself each is described far better than by what both say, and neither describes the other.
+fn contradiction(
+    runs: [&SensorRun; 2],
+    model: &SensorModel,
+    identify: &impl Fn(&[SensorRun]) -> Result<SensorModel, Refusal>,
+) -> Option<String> {
+    let off = |model: &SensorModel, run: &SensorRun| scatter(&model.left(run));
+    let noise = |run: &SensorRun| {
+        let steps = model.left(run);
+        robust_deviation(steps.windows(2).map(|w| w[1] - w[0])) * std::f64::consts::FRAC_1_SQRT_2
+    };
+    let together = runs.map(|run| off(model, run));
+    if (0..2).any(|at| together[at] < ODD * noise(runs[at])) {
+        return None;
+    }
+    let [first, second] = runs.map(|run| identify(std::slice::from_ref(run)).ok());
+    let (first, second) = (first?, second?);
+    let own = [off(&first, runs[0]), off(&second, runs[1])];
+    let across = [off(&second, runs[0]), off(&first, runs[1])];
+    let contradicts = (0..2).all(|at| ODD * own[at] < together[at].min(across[at]));
+    contradicts.then(|| {
+        format!(
+            "{} and {} contradict each other: by itself the one is described to {:.4}° and the other to {:.4}°, by what both say to {:.4}° and \
+             {:.4}°: they are of two sensors, or it was mounted anew; a third run would tell which is right, and each by itself is a campaign",
+            runs[0].name,
+            runs[1].name,
+            own[0].to_degrees(),
+            own[1].to_degrees(),
+            together[0].to_degrees(),
+            together[1].to_degrees()
+        )
+    })
 }
 
 /// The runs without one of them.
