@@ -39,10 +39,14 @@ const BALANCE_SHARE_ALONE: f64 = 3.0;
 const LARGEST_LEAD: f64 = 0.3;
 /// How well a search places a line, as a share of its width, one over the longest run.
 const LINE_SHARE: f64 = 0.1;
-/// A split that the quadrature balance cannot rule out, rad/s, and how far it is trusted where ring-downs tell the force scale:
-/// what the model still lacks was seen to move it by 3 %.
-const LEAST_ANISOELASTICITY: f64 = 0.02;
-const QUADRATURE_SHARE: f64 = 0.05;
+/// How far the quadrature balance is trusted where ring-downs tell the force scale: what the model still lacks was seen to move it by
+/// 1 to 3 %.
+const QUADRATURE_SHARE: f64 = 0.02;
+/// A split that the balance cannot rule out, rad/s: at rest, per rad/s of precession, which a phase of the channels makes a quadrature of,
+/// and at the most.
+const LEAST_ANISOELASTICITY: f64 = 3e-3;
+const PER_PRECESSION: f64 = 3e-3;
+const MOST_ANISOELASTICITY: f64 = 0.02;
 /// The smallest noise that is believed, rad: rounding of the angle itself.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -325,7 +329,10 @@ impl Dataset {
         }
         if let Some(w) = normal.try_inverse().map(|i| i * right) {
             let share = drive.map_or(BALANCE_SHARE, |d| QUADRATURE_SHARE.hypot(d.mean_error));
-            let deviation = share * w.norm() + LEAST_ANISOELASTICITY;
+            let fastest = fitted_tracks(&self.tracks).map(|t| hypothesis.precession(t.mean_speed()).abs());
+            let fastest = fastest.fold(0.0, f64::max);
+            let unseen = (LEAST_ANISOELASTICITY + PER_PRECESSION * fastest).min(MOST_ANISOELASTICITY);
+            let deviation = share * w.norm() + unseen;
             self.quadrature_balance = Some(([w[0], w[1]], deviation));
         }
     }
