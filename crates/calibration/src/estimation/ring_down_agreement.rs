@@ -10,6 +10,7 @@ use crate::error::Refusal;
 use crate::estimation::actuation::{RingDown, ring_down};
 use crate::estimation::joint_fit::Dataset;
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::median;
 use crate::recording::{Role, Run};
 
@@ -21,6 +22,12 @@ const LEAST_DRIVE: f64 = 0.2;
 /// Once the anisodamping is known, dampings of ring-downs agree within this share, or within so many deviations.
 const SAME_DAMPING: f64 = 0.05;
 const DEVIATIONS: f64 = 6.0;
+/// An anisodamping of the ring-downs' own: its unknowns, how far off it each may be in deviations, of which one is no less than this share
+/// of the decay time, and how much of the damping it may be. Engineering choices.
+const OWN_UNKNOWNS: usize = 3;
+const OWN_DEVIATIONS: f64 = 3.0;
+const LEAST_TAU_ERROR: f64 = 1e-3;
+const LARGEST_OWN: f64 = 0.15;
 /// The command that holds a pattern against what turns it is at most so many times the energy command.
 const LARGEST_HOLD: f64 = 2.0;
 /// Runs that differ in temperature by more than this differ in their damping.
@@ -75,7 +82,7 @@ impl Dataset {
                 },
             ));
         }
-        if odd.is_empty() && self.tracks_differ() {
+        if odd.is_empty() && self.tracks_differ() && !agree_by_themselves(&all) {
             odd = contradictions(&all, hypothesis, usual);
         }
         for (at, why) in odd.iter().rev() {
@@ -143,6 +150,27 @@ pub(crate) fn spread_of_dampings(all: &[RingDown], hypothesis: &Hypothesis) -> f
     };
     let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
     if low > 0.0 { high / low - 1.0 } else { 0.0 }
+}
+
+/// Whether four ring-downs or more are of one resonator by an anisodamping of their own, 1/τ = c + A cos 2θ + B sin 2θ: then it is the
+/// rotations' that is off, for want of an effect that they lack.
+fn agree_by_themselves(all: &[RingDown]) -> bool {
+    if all.len() <= OWN_UNKNOWNS {
+        return false;
+    }
+    let row = |r: &RingDown| {
+        let (sin, cos) = (2.0 * r.angle_rad).sin_cos();
+        let weight = r.tau_s * r.tau_s / r.tau_error_s.max(LEAST_TAU_ERROR * r.tau_s);
+        ([weight, weight * cos, weight * sin], weight / r.tau_s)
+    };
+    let mut equations = NormalEquations::new(OWN_UNKNOWNS);
+    all.iter().map(row).for_each(|(row, value)| equations.add(&row, value));
+    let found = equations.solve();
+    let off = |r: &RingDown| {
+        let (row, value) = row(r);
+        (value - row.iter().zip(&found).map(|(a, x)| a * x).sum::<f64>()).abs()
+    };
+    found[1].hypot(found[2]) < LARGEST_OWN * found[0] && all.iter().all(|r| off(r) < OWN_DEVIATIONS)
 }
 
 /// Ring-downs whose damping, less the anisodamping, is not that of the others. Of two, the one that takes another drive than
