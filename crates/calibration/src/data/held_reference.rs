@@ -17,9 +17,10 @@ const FEWEST_ROWS: usize = 3;
 const ALIKE: f64 = 0.9;
 /// Share, of what an even turn would be, that the instrument turns by within a reading.
 const TURNS_ON: f64 = 0.5;
-/// A digit of an encoder is below this, deg, and of one size: steps that differ by this share of the usual are none.
-const LARGEST_DIGIT_DEG: f64 = 0.5;
-const UNLIKE: f64 = 0.2;
+/// A digit of an encoder is below this, deg, and of one size: steps that differ by this share of the usual are none. A table at one rate
+/// that is recorded as it was commanded may look like one, and is left as it is.
+const LARGEST_DIGIT_DEG: f64 = 2.0;
+const UNLIKE: f64 = 0.01;
 /// A step above this, deg, may be one the other way round.
 const LARGEST_STEP_DEG: f64 = 120.0;
 
@@ -140,6 +141,10 @@ mod tests {
         digits.table_deg.iter_mut().flatten().for_each(|a| *a = (*a / 0.35).round() * 0.35);
         let mut coarse = read_every(1);
         coarse.table_deg.iter_mut().flatten().for_each(|a| *a = (*a / 8.0).round() * 8.0);
+        // at one rate a digit stands for the same number of rows
+        let mut even = read_every(1);
+        even.theta_deg = Some(even.t_s.iter().map(|t| (20.0 * t).rem_euclid(360.0)).collect());
+        even.table_deg = Some(even.t_s.iter().map(|t| (20.0 * t).round()).collect());
         let mut stations = read_every(10);
         let there = stations.table_deg.clone();
         stations.theta_deg =
@@ -150,6 +155,7 @@ mod tests {
             ("each row", read_every(1)),
             ("digits", digits),
             ("coarse", coarse),
+            ("even", even),
             ("stations", stations),
             ("resting", resting),
         ] {
