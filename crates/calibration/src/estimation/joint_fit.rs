@@ -39,9 +39,9 @@ const BALANCE_SHARE_ALONE: f64 = 3.0;
 const LARGEST_LEAD: f64 = 0.3;
 /// How well a search places a line, as a share of its width, one over the longest run.
 const LINE_SHARE: f64 = 0.1;
-/// How far the quadrature balance is trusted where ring-downs tell the force scale: what the model still lacks was seen to move it by
-/// 1 to 3 %.
-const QUADRATURE_SHARE: f64 = 0.02;
+/// How far the quadrature balance is trusted where ring-downs tell the force scale, at rest and from a precession of 1 rad/s on: what the
+/// model still lacks was seen to move it by 1 to 3 %, and at speed the angle tells a split by itself.
+const QUADRATURE_SHARE: [f64; 2] = [0.02, 0.05];
 /// A split that the balance cannot rule out, rad/s: at rest, per rad/s of precession, which a phase of the channels makes a quadrature of,
 /// and at the most.
 const LEAST_ANISOELASTICITY: f64 = 3e-3;
@@ -328,9 +328,11 @@ impl Dataset {
             }
         }
         if let Some(w) = normal.try_inverse().map(|i| i * right) {
-            let share = drive.map_or(BALANCE_SHARE, |d| QUADRATURE_SHARE.hypot(d.mean_error));
             let fastest = fitted_tracks(&self.tracks).map(|t| hypothesis.precession(t.mean_speed()).abs());
             let fastest = fastest.fold(0.0, f64::max);
+            let [at_rest, at_speed] = QUADRATURE_SHARE;
+            let trusted = at_rest + (at_speed - at_rest) * fastest.min(1.0);
+            let share = drive.map_or(BALANCE_SHARE, |d| trusted.hypot(d.mean_error));
             let unseen = (LEAST_ANISOELASTICITY + PER_PRECESSION * fastest).min(MOST_ANISOELASTICITY);
             let deviation = share * w.norm() + unseen;
             self.quadrature_balance = Some(([w[0], w[1]], deviation));
