@@ -86,3 +86,40 @@ pub fn channels(angles_deg: &[f64], unit: f64, cubic: f64, noise_v: f64, seed: u
         })
         .unzip()
 }
+
+/// Two channels at angles, deg, a reading a second.
+#[must_use]
+pub fn read_at(angles: Vec<f64>, x: Vec<f64>, y: Vec<f64>, role: Role) -> Run {
+    let recording = Recording {
+        t_s: (0..angles.len()).map(|i| i as f64).collect(),
+        table_deg: Some(angles),
+        xc_v: Some(x),
+        yc_v: Some(y),
+        ..Recording::default()
+    };
+    run("stations.csv", role, recording)
+}
+
+/// An angle at stations, deg, a degree a second.
+#[must_use]
+pub fn angle_at(degrees: Vec<f64>, theta: impl FnMut(f64) -> f64, role: Role) -> Run {
+    let recording = Recording {
+        t_s: degrees.iter().map(|d| (d - degrees[0]).abs()).collect(),
+        theta_deg: Some(degrees.iter().copied().map(theta).collect()),
+        table_deg: Some(degrees),
+        ..Recording::default()
+    };
+    run("stations.csv", role, recording)
+}
+
+/// An angle at stations, deg, a row a second.
+#[must_use]
+pub fn a_row_a_second(degrees: Vec<f64>, theta: impl FnMut(f64) -> f64, role: Role) -> Run {
+    let recording = Recording {
+        t_s: (0..degrees.len()).map(|i| i as f64).collect(),
+        theta_deg: Some(degrees.iter().copied().map(theta).collect()),
+        table_deg: Some(degrees),
+        ..Recording::default()
+    };
+    run("stations.csv", role, recording)
+}

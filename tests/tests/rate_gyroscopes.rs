@@ -553,25 +553,3 @@ fn runs_that_hardly_turn_are_not_of_another_gyroscope() {
         assert!((i.report.angular_gain.value.abs() - 0.99).abs() < 0.01, "seed {seed}: {:?}", i.report.angular_gain);
     }
 }
-
-/// One turn in three seconds between rests: a fifth of the time that holds it, left out, would leave rests alone.
-#[test]
-fn a_turn_between_rests_tells_the_scale_factor() {
-    let mut noise = Noise::new(3);
-    let (mut angle, mut walk) = (0.0, 0.0);
-    // the last quarter is held out
-    let rows: Vec<[f64; 3]> = (0..2700)
-        .map(|i| {
-            let t = 0.01 * f64::from(i);
-            angle += if (4.2..7.2).contains(&t) { 1.2 } else { 0.01 * (3.0 * t).sin() };
-            walk += 0.01 * noise.sample();
-            [t, angle, 0.98 * angle + 0.1 * t + walk]
-        })
-        .collect();
-    let column = |at: usize| rows.iter().map(|r| r[at]).collect();
-    let recording =
-        Recording { t_s: column(0), table_deg: Some(column(1)), theta_deg: Some(column(2)), ..Recording::default() };
-    let i = turned(vec![run("turn.csv", Role::Fit, recording)]).unwrap();
-    let k = i.report.angular_gain;
-    assert!((k.value.abs() - 0.98).abs() < k.half_width() && k.half_width() < 0.1, "{k:?}");
-}

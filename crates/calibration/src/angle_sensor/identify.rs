@@ -13,7 +13,7 @@ use super::rate_runs;
 use super::readout::Kind;
 use super::report::{ByItself, Errors, Finding, Head, report};
 use super::samples::{Reading, SensorRun, apart, prepare};
-use super::screening::believed;
+use super::screening::{LARGEST_STEP, believed};
 use super::sensor::other_unit;
 use super::sensor_alone::alone;
 use super::table_fit::Sample;
@@ -68,6 +68,8 @@ const TIME_WAVES: usize = 4;
 const TURNS_FOR_WAVES: f64 = 1.5;
 /// Rows beyond which the decomposition and the jackknife look at every so many.
 const ENOUGH_ROWS: usize = 3000;
+/// How far an angle may turn, of what its gain asks for, and be of its reference.
+const FOLLOWING: std::ops::Range<f64> = 0.5..2.0;
 /// Half a turn, rad, as it is measured: rows stand a little short of both its ends.
 const HALF_A_TURN: f64 = 0.99 * std::f64::consts::PI;
 
@@ -199,11 +201,6 @@ fn require_a_turn([runs, held]: [&[SensorRun]; 2], gain: f64, period: f64) -> Re
     }
     Ok(())
 }
-
-/// How far an angle may turn, of what its gain asks for, and be of its reference.
-const FOLLOWING: std::ops::Range<f64> = 0.5..2.0;
-/// Steps of the reference, of the period, over which an angle is followed from row to row.
-const LARGEST_STEP: f64 = 0.125;
 
 /// An angle that hardly turns while its reference does is none of it: as a rule it is a rate, or in another unit.
 fn require_following(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {

@@ -74,7 +74,8 @@ impl SensorModel {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
-        let selected = Selection::new(&sensor, runs, rails, &starts, texts).select();
+        let mut selection = Selection::new(&sensor, runs, rails, &starts, texts);
+        let selected = selection.select();
         let refusal = || {
             Refusal::no_answer(
                 "campaign",
@@ -86,7 +87,7 @@ impl SensorModel {
         let stride = (rows / ENOUGH_ROWS).max(1);
         let thinned: Vec<SensorRun> = runs.iter().map(|r| r.thinned(stride)).collect();
         let models: Vec<Self> =
-            selected.iter().filter_map(|s| Self::fitted(sensor, s, &thinned, rails, &starts)).collect();
+            selected.iter().filter_map(|s| Self::fitted(sensor, &selection, s, &thinned, rails, &starts)).collect();
         let answered = models.iter().find(|m| m.outcome == Outcome::Answered);
         answered.or(models.first()).cloned().ok_or_else(refusal)
     }
@@ -118,6 +119,7 @@ impl SensorModel {
 
     fn fitted(
         sensor: Sensor,
+        selection: &Selection<'_>,
         selected: &Selected,
         runs: &[SensorRun],
         rails: Rails,
@@ -135,18 +137,13 @@ impl SensorModel {
         let mut predicted = selected.losses.rms();
         let left = by_run(&samples, runs.len(), |s| table.left(s));
         let unknowns = readout.as_ref().map_or(0, |r| r.0.free().len()) + shape.size();
-        let mut gain = autoregression::gain(&raw_errors, &left, unknowns);
-        if gain <= 0.0
-            && let Some((shape, losses)) = &selected.across_gaps
-        {
+        let mut stands = autoregression::gain(&raw_errors, &left, unknowns) > 0.0;
+        if !stands && let Some((shape, losses)) = selection.across_gaps(&selected.model) {
             // where rows are dense and the sensor rests, memory follows any error; this is predicted where no memory reaches
-            table = TableFit::new(shape, &samples, runs.len(), sensor.cycles)?;
-            predicted = losses.rms();
-            gain = f64::MIN_POSITIVE;
+            table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)?;
+            (predicted, stands) = (losses.rms(), true);
         }
-        if gain <= 0.0
-            && let Some((alone, losses)) = selected.readout_alone.as_ref().filter(|(f, _)| f.0 != Kind::Plain)
-        {
+        if !stands && let Some((alone, losses)) = selected.readout_alone.as_ref().filter(|(f, _)| f.0 != Kind::Plain) {
             // what the memory of the noise explains as well is no table; a readout shows in the radius, too
             let (found, weighting) = with(alone)?;
             let raw = Readout { rails, ..Readout::plain() };
@@ -154,14 +151,14 @@ impl SensorModel {
                 |readout: &Readout| -> Vec<_> { runs.iter().map(|r| circle::ln_radius(r, readout)).collect() };
             samples = sensor.samples(runs, Some(&found));
             let errors = by_run(&samples, runs.len(), |s| s.error);
-            gain = autoregression::gain(&raw_errors, &errors, found.free().len())
-                + autoregression::gain(&ln_radius(&raw), &ln_radius(&found), 0);
+            let of_angle = autoregression::gain(&raw_errors, &errors, found.free().len());
+            stands = of_angle + autoregression::gain(&ln_radius(&raw), &ln_radius(&found), 0) > 0.0;
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
             (readout, predicted) = (Some((found, weighting)), losses.rms());
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();
-        let helps = follows && predicted_raw.is_none_or(|raw| predicted < raw) && gain > 0.0;
+        let helps = follows && predicted_raw.is_none_or(|raw| predicted < raw) && stands;
         let model = Self {
             sensor,
             outcome: Outcome::Answered,

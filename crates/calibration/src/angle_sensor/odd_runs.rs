@@ -6,7 +6,7 @@ use super::model::SensorModel;
 use super::samples::SensorRun;
 use crate::error::Refusal;
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, robust_deviation, root_mean_square};
+use crate::numerics::statistics::{median, root_mean_square, white_noise};
 
 /// Runs from which on one can be odd, and the share of them that may be left out.
 const FEWEST_RUNS: usize = 3;
@@ -66,12 +66,8 @@ fn contradiction(
     identify: &impl Fn(&[SensorRun]) -> Result<SensorModel, Refusal>,
 ) -> Option<String> {
     let off = |model: &SensorModel, run: &SensorRun| scatter(&model.left(run));
-    let noise = |run: &SensorRun| {
-        let steps = model.left(run);
-        robust_deviation(steps.windows(2).map(|w| w[1] - w[0])) * std::f64::consts::FRAC_1_SQRT_2
-    };
     let together = runs.map(|run| off(model, run));
-    if (0..2).any(|at| together[at] < ODD * noise(runs[at])) {
+    if (0..2).any(|at| together[at] < ODD * white_noise(&model.left(runs[at]))) {
         return None;
     }
     let [first, second] = runs.map(|run| identify(std::slice::from_ref(run)).ok());

@@ -304,4 +304,19 @@ mod tests {
             assert!((estimate(&runs, &[Term::Bias], law)[0] - BIAS_RAD_S).abs() < 1e-6, "{law:?}");
         }
     }
+
+    #[test]
+    fn a_turn_between_rests_is_in_more_than_one_part() {
+        let t: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i)).collect();
+        let of = |turn: &dyn Fn(f64) -> f64| {
+            let stretch = Stretch::of(t.clone(), t.iter().map(|t| turn(*t)).collect(), vec![0.0; t.len()]);
+            stretch.edges(5)
+        };
+        assert_eq!(of(&|t| 0.5 * t), [0, 200, 400, 600, 800, 1000], "alike in time where it turns evenly");
+        // all of the turn from 2.2 s to 3.8 s, within the second fifth
+        let edges = of(&|t| (t - 2.2).clamp(0.0, 1.6));
+        let turn = |part: &[usize]| (part[1].min(380) as f64 - part[0].max(220) as f64).max(0.0) / 160.0;
+        let most = edges.windows(2).map(turn).fold(0.0, f64::max);
+        assert!(edges.is_sorted() && edges.len() == 6 && most < 0.5, "{edges:?}: {most} of the turn in one part");
+    }
 }

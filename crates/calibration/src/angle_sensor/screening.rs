@@ -17,7 +17,7 @@ use crate::numerics::statistics::{line, median, robust_deviation};
 const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
 /// A run tells how its angle goes with the reference over this many periods, in steps below this share of one.
 const FEWEST_PERIODS: f64 = 2.0;
-const LARGEST_STEP: f64 = 0.125;
+pub(super) const LARGEST_STEP: f64 = 0.125;
 /// An angle that scatters by more than this share of its period about its line does not follow the reference: the usual
 /// error of an angle sensor is a tenth of that.
 const LOST: f64 = 0.1;

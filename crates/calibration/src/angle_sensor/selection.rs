@@ -76,8 +76,6 @@ pub(crate) struct Selected {
     pub(crate) readout_alone: Option<(Front, Losses)>,
     /// those of the sensor as it is
     pub(crate) raw: Option<Losses>,
-    /// the table beside this readout that predicts fifths of the way that it has not seen, where no memory of noise reaches
-    pub(crate) across_gaps: Option<(Shape, Losses)>,
     /// what goes with the rate is told from what goes with the position
     pub(crate) tells_motion: bool,
 }
@@ -144,22 +142,21 @@ impl<'a> Selection<'a> {
             let without_table: Vec<_> = among.iter().filter(|c| c.model.1 == constant).cloned().collect();
             choose(&without_table, Tolerance::One).and_then(|c| Some((c.model.0.clone()?, c.losses.clone())))
         };
+        let tells_motion = self.is_told_from_position(|s| s.rate);
         let with_lines = |c: Candidate<Model>| {
             let readout_alone = readout_alone(if c.texts > 0 { &pool } else { &of_the_library });
             let short = short_beside(&c, &pool).map(|short| self.with_lines(short));
             let long = self.with_lines(c);
             let Candidate { model, losses, .. } =
                 short.filter(|short| short.losses.rms() <= long.losses.rms()).unwrap_or(long);
-            let across_gaps = self.across_gaps(&model);
-            let tells_motion = self.is_told_from_position(|s| s.rate);
-            Selected { readout_alone, raw: raw.clone(), model, losses, across_gaps, tells_motion }
+            Selected { readout_alone, raw: raw.clone(), model, losses, tells_motion }
         };
         chosen.into_iter().map(with_lines).collect()
     }
 
     /// The table that predicts fifths of the way of each run, left out as a whole, far better than the sensor as it is does: the one that
-    /// was chosen, or the best.
-    fn across_gaps(&self, (front, chosen): &Model) -> Option<(Shape, Losses)> {
+    /// was chosen, or the best. No memory of noise reaches so far.
+    pub(crate) fn across_gaps(&self, (front, chosen): &Model) -> Option<(Shape, Losses)> {
         let folds = Folds::of_the_way(&self.runs);
         let samples = |readout: Option<&Readout>| self.sensor.samples(&self.runs, readout);
         let without: Vec<Vec<Sample>> = (0..folds.count)
@@ -321,7 +318,7 @@ impl<'a> Selection<'a> {
 
     /// Whether a motion is more than a function of the position: where a position is met again, it is another. In one pass, and in a
     /// harmonic swing within a turn, it is not, and what follows it a table explains as well.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS_OF_MOTION")]
     fn is_told_from_position(&self, motion: impl Fn(&Sample) -> f64) -> bool {
         let samples = self.sensor.samples(&self.runs, None);
         let place = |s: &Sample| {
@@ -535,11 +532,55 @@ pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::statistics::remembered;
 
     #[test]
     fn rows_carry_as_many_unknowns_as_they_observe() {
         let least = |of_readout, of_table| (0..).find(|rows| carries(*rows, of_readout, of_table, 1, 3));
         let affine = Kind::Affine.free().len();
         assert_eq!([least(0, 8), least(affine, 0), least(affine, 8)], [Some(27), Some(8), Some(27)]);
+    }
+
+    /// One turn in four moves between rests, in even rows of an angle that is off by these degrees.
+    fn moved_between_rests(error_deg: impl Fn(usize, f64) -> f64) -> SensorRun {
+        let place = |i: usize| 1.55 * ((i / 200) as f64 + (i % 200).saturating_sub(140) as f64 / 60.0);
+        let reference_rad: Vec<f64> = (0..800).map(place).collect();
+        let theta = reference_rad.iter().enumerate().map(|(i, a)| a + error_deg(i, *a).to_radians());
+        SensorRun {
+            name: "moved.csv".into(),
+            number: 0,
+            role: crate::recording::Role::Fit,
+            commanded: false,
+            t_s: (0..800).map(f64::from).collect(),
+            rate_rad_s: vec![0.02; 800],
+            acceleration_rad_s2: vec![0.0; 800],
+            temp_c: None,
+            recorded: None,
+            reading: Reading::Angle(theta.collect()),
+            reference_rad,
+        }
+    }
+
+    #[test]
+    fn a_smooth_error_is_predicted_across_gaps_and_a_walk_is_not() {
+        let across = |run: SensorRun| {
+            let runs = [run];
+            let sensor = Sensor { gain: 1.0, free_gain: false, period: std::f64::consts::TAU, cycles: 1.0 };
+            let selection = Selection::new(&sensor, &runs, Rails::none(), &[], &[]);
+            let long = Shape { form: Form::Own, order: 16, ..Shape::constant(false) };
+            selection.across_gaps(&(None, long)).map(|(shape, _)| shape.order)
+        };
+        let smooth = |_, a: f64| 9.0 * a.sin() + 5.0 * (2.0 * a).cos();
+        assert!(across(moved_between_rests(smooth)).is_some_and(|order| order >= 2));
+        for seed in 0..8 {
+            let walk: Vec<f64> = remembered(0.0, 800, 1 + 7919 * seed)
+                .into_iter()
+                .scan(0.0, |sum, u| {
+                    *sum += 0.3 * u;
+                    Some(*sum)
+                })
+                .collect();
+            assert_eq!(across(moved_between_rests(|i, _| walk[i])), None, "seed {seed}");
+        }
     }
 }

@@ -7,6 +7,7 @@
 
 use crate::data::plausibility::leave_out;
 use crate::numerics::angles::unwrapped;
+use crate::numerics::interpolation;
 use crate::numerics::statistics::{median, span};
 use crate::recording::Recording;
 
@@ -39,7 +40,8 @@ pub(crate) fn go_on_evenly(recording: &mut Recording) -> Option<String> {
     }
     let values = unwrapped(readings.iter().map(|i| table[*i].to_radians()), std::f64::consts::TAU);
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs().to_degrees()).collect();
-    let step = median(&mut steps);
+    steps.sort_by(f64::total_cmp);
+    let step = steps[steps.len() / 2];
     let spread = span(&steps[steps.len() / 10..steps.len() - steps.len() / 10]);
     if step > LARGEST_STEP_DEG || (step < LARGEST_DIGIT_DEG && spread < UNLIKE * step) {
         return None;
@@ -55,8 +57,9 @@ pub(crate) fn go_on_evenly(recording: &mut Recording) -> Option<String> {
         return None;
     }
     let name = recording.source.display().to_string();
-    let evenly = between(&recording.t_s, &readings, &values);
-    recording.table_deg = Some(evenly.iter().map(|a| a.to_degrees()).collect());
+    let read_s: Vec<f64> = readings.iter().map(|i| recording.t_s[*i]).collect();
+    let evenly = recording.t_s.iter().map(|t| interpolation::at(&read_s, *t, |i| values[i]).to_degrees());
+    recording.table_deg = Some(evenly.collect());
     // what comes after the last reading is not known
     let last = readings[readings.len() - 1];
     let unknown: Vec<bool> = (0..recording.len()).map(|row| row > last).collect();
@@ -87,18 +90,6 @@ fn turned(recording: &Recording) -> Option<Vec<f64>> {
     };
     let (x0, y0) = (middle(x), middle(y));
     Some(unwrapped(x.iter().zip(y).map(|(x, y)| (y - y0).atan2(x - x0)), std::f64::consts::TAU))
-}
-
-/// Values at `readings` with straight lines between them; that of the last goes on.
-fn between(t_s: &[f64], readings: &[usize], values: &[f64]) -> Vec<f64> {
-    let mut out = vec![values[values.len() - 1]; t_s.len()];
-    for (rows, ends) in readings.windows(2).zip(values.windows(2)) {
-        let (from, to) = (t_s[rows[0]], t_s[rows[1]]);
-        for row in rows[0]..rows[1] {
-            out[row] = ends[0] + (ends[1] - ends[0]) * (t_s[row] - from) / (to - from);
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -1,20 +1,18 @@
 //! From a campaign to an identified instrument: prepare, fit what is declared, and what the residual asks for.
 
 use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
-use nalgebra::{Matrix2, Vector2};
 
 use crate::data::plausibility::{without_commands_in_another_unit, without_dead_command, without_held_commands};
 use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
 use crate::estimation::amplitude_equation::energy_balance;
-use crate::estimation::fit::{BEYOND_BELIEF, Effort, Fit, Noise, Prepared, Prior, fit};
+use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
 use crate::estimation::initial_guess::Motion;
-use crate::estimation::propagation::{Start, Stepping, propagate};
+use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::model::unknowns::Unknowns;
 use crate::numerics::statistics::{median, robust_deviation, white_noise};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 
@@ -33,20 +31,12 @@ const SPIKE: f64 = 6.0;
 /// What the energy balance leaves of ln a, and how far it is trusted at best; less where the angle has no say in the
 /// force scale. A recorded v_as is taken to act, noise and all: noise that a logger added pulls the scale towards zero.
 const BALANCE_NOISE: f64 = 1e-3;
-const BALANCE_SHARE: f64 = 0.3;
+pub(super) const BALANCE_SHARE: f64 = 0.3;
 const BALANCE_SHARE_ALONE: f64 = 3.0;
 /// How far below the usual misfit of all runs, as a share of it, one run's is believed.
 const LARGEST_LEAD: f64 = 0.3;
 /// How well a search places a line, as a share of its width, one over the longest run.
 const LINE_SHARE: f64 = 0.1;
-/// How far the quadrature balance is trusted where ring-downs tell the force scale, at rest and from a precession of 1 rad/s on: what the
-/// model still lacks was seen to move it by 1 to 3 %, and at speed the angle tells a split by itself.
-const QUADRATURE_SHARE: [f64; 2] = [0.02, 0.05];
-/// A split that the balance cannot rule out, rad/s: at rest, per rad/s of precession, which a phase of the channels makes a quadrature of,
-/// and at the most.
-const LEAST_ANISOELASTICITY: f64 = 3e-3;
-const PER_PRECESSION: f64 = 3e-3;
-const MOST_ANISOELASTICITY: f64 = 0.02;
 /// The smallest noise that is believed, rad: rounding of the angle itself.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -256,13 +246,13 @@ impl Dataset {
                 all.push(prior(Unknown::Effect(i, p), m.values[p], width));
             }
         }
-        // At one rate the sine part of anisodamping is a detection gain mismatch to the last digit: it is held, and
-        // widens the interval of that.
         if let Some(member) = hypothesis.position(EffectId::Anisoelasticity).filter(|_| self.split_is_held) {
             for p in all.iter_mut().filter(|p| (0..2).any(|i| p.unknown == Unknown::Effect(member, i))) {
                 p.considered = true;
             }
         }
+        // At one rate the sine part of anisodamping is a detection gain mismatch to the last digit: it is held, and
+        // widens the interval of that.
         if let Some(member) = hypothesis.position(EffectId::Anisodamping).filter(|_| !self.tracks_differ()) {
             for p in all.iter_mut().filter(|p| p.unknown == Unknown::Effect(member, 1)) {
                 p.considered = true;
@@ -284,90 +274,14 @@ impl Dataset {
         }
     }
 
-    /// Δω from the quadrature balance, q̇ = G v_qc + ½a(Δω sin2θ_ω cos2θ − Δω cos2θ_ω sin2θ), at the hypothesis' force
-    /// scale: what the loop had to cancel. A belief for the fit of the angle, where Δω shows only through the
-    /// quadrature that is left.
-    fn balance_quadrature(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) {
-        self.quadrature_balance = None;
-        if hypothesis.force_scale == 0.0 || !self.tracks.iter().all(|p| p.track.records_the_loops()) {
-            return;
-        }
-        let none = Unknowns::new(hypothesis, Vec::new());
-        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for p in &self.tracks {
-            for (segment, start) in p.track.segments.iter().zip(&p.starts).filter(|(s, _)| s.role == Role::Fit) {
-                let mut last: Option<(f64, [f64; 3])> = None;
-                let (mut sums, mut rows) = ([0.0; 3], Vec::new());
-                let stepping = Stepping::without(p.limit.angle);
-                propagate(&p.track, segment, hypothesis, &none, *start, stepping, |row| {
-                    if row.angle.abs() > stepping.spike {
-                        return;
-                    }
-                    let pendulum = row.vibration.pendulum();
-                    let line = pendulum.r.hypot(pendulum.s);
-                    let Some(v) = p.track.commands(row.index, 1).filter(|_| line > 0.0) else { return };
-                    let (sin, cos) = (pendulum.s / line, pendulum.r / line);
-                    let command = hypothesis.force_scale * v.now.v_qc / pendulum.e.sqrt();
-                    let rates = [command, -0.5 * sin, 0.5 * cos];
-                    let t = p.track.t_s[row.index];
-                    if let Some((t0, before)) = last {
-                        for ((sum, a), b) in sums.iter_mut().zip(before).zip(rates) {
-                            *sum += 0.5 * (t - t0) * (a + b);
-                        }
-                    }
-                    last = Some((t, rates));
-                    rows.push([0.5 * pendulum.q / pendulum.e - sums[0], sums[1], sums[2]]);
-                });
-                let n = rows.len().max(1) as f64;
-                let mean = rows.iter().fold([0.0; 3], |m, r| std::array::from_fn(|i| m[i] + r[i] / n));
-                for r in &rows {
-                    let x = Vector2::new(r[1] - mean[1], r[2] - mean[2]);
-                    normal += x * x.transpose();
-                    right += x * (r[0] - mean[0]);
-                }
-            }
-        }
-        if let Some(w) = normal.try_inverse().map(|i| i * right) {
-            let fastest = fitted_tracks(&self.tracks).map(|t| hypothesis.precession(t.mean_speed()).abs());
-            let fastest = fastest.fold(0.0, f64::max);
-            let [at_rest, at_speed] = QUADRATURE_SHARE;
-            let trusted = at_rest + (at_speed - at_rest) * fastest.min(1.0);
-            let share = drive.map_or(BALANCE_SHARE, |d| trusted.hypot(d.mean_error));
-            let unseen = (LEAST_ANISOELASTICITY + PER_PRECESSION * fastest).min(MOST_ANISOELASTICITY);
-            let deviation = share * w.norm() + unseen;
-            self.quadrature_balance = Some(([w[0], w[1]], deviation));
-        }
-    }
-
-    /// A split that is not yet fitted begins where the quadrature balance sees it: from zero, a large one under a fast
-    /// rotation lies beyond other minima.
-    fn begin_with_the_balance(&self, hypothesis: &mut Hypothesis) {
-        let (Some((split, _)), Some(member)) =
-            (self.quadrature_balance, hypothesis.position(EffectId::Anisoelasticity))
-        else {
-            return;
-        };
-        if self.split_is_held || hypothesis.members[member].values == EffectId::Anisoelasticity.neutral() {
-            hypothesis.members[member].values[..2].copy_from_slice(&split);
-        }
-    }
-
-    /// Whether a fit took Δω further from what the quadrature loop had to cancel than is believed of either. With little
-    /// quadrature left, as at low rates, the angle shows Δω by its square alone, in 4θ and in k, where readout that is not
-    /// linear shows too.
-    fn contradicts_the_balance(&self, fitted: &Hypothesis) -> bool {
-        let (Some((split, deviation)), Some(member)) =
-            (self.quadrature_balance, fitted.position(EffectId::Anisoelasticity))
-        else {
-            return false;
-        };
-        let values = &fitted.members[member].values;
-        split.iter().zip(values).any(|(told, value)| (value - told).abs() > BEYOND_BELIEF * deviation)
-    }
-
     /// Fits a hypothesis from where the runs are, moves them there and measures what is left; says whether that is what
     /// the fit was weighted by.
-    fn fitted(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>, effort: Effort) -> (Fit, bool) {
+    pub(super) fn fitted(
+        &mut self,
+        hypothesis: &Hypothesis,
+        drive: Option<&DriveGains>,
+        effort: Effort,
+    ) -> (Fit, bool) {
         let (unknowns, priors) = (self.unknowns(hypothesis), self.priors(hypothesis, drive));
         let result = fit(&self.tracks, hypothesis, &unknowns, &priors, Role::Fit, effort);
         for (p, s) in self.tracks.iter_mut().zip(&result.starts) {
@@ -382,29 +296,7 @@ impl Dataset {
         (result, settled)
     }
 
-    /// Fits with Δω held where the quadrature balance has it, and then free from there, which is kept where the fit stays with it.
-    fn with_the_split_held(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Fit {
-        let mut hypothesis = hypothesis.clone();
-        self.split_is_held = true;
-        self.begin_with_the_balance(&mut hypothesis);
-        let mut held = self.fitted(&hypothesis, drive, Effort::FULL);
-        for _ in ROUNDS..MOST_ROUNDS {
-            if held.1 {
-                break;
-            }
-            held = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
-        }
-        let weighting = self.weighting();
-        self.split_is_held = false;
-        let (freed, _) = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
-        if self.contradicts_the_balance(&freed.hypothesis) {
-            self.weigh_by(&weighting);
-            return held.0;
-        }
-        freed
-    }
-
-    fn weighting(&self) -> Weighting {
+    pub(super) fn weighting(&self) -> Weighting {
         Weighting {
             runs: self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect(),
             energy_balance: self.energy_balance,
@@ -414,7 +306,7 @@ impl Dataset {
         }
     }
 
-    fn weigh_by(&mut self, weighting: &Weighting) {
+    pub(super) fn weigh_by(&mut self, weighting: &Weighting) {
         for (p, ([noise, white, limit], starts)) in self.tracks.iter_mut().zip(&weighting.runs) {
             (p.noise, p.white, p.limit) = (*noise, *white, *limit);
             p.starts.clone_from(starts);
@@ -482,7 +374,7 @@ fn prepared_run(track: Track, motion: Motion, instrument: Instrument) -> Prepare
 }
 
 /// The tracks of which some samples are fitted.
-fn fitted_tracks(tracks: &[Prepared]) -> impl Iterator<Item = &Track> {
+pub(super) fn fitted_tracks(tracks: &[Prepared]) -> impl Iterator<Item = &Track> {
     tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0)
 }
 
@@ -521,7 +413,7 @@ pub(crate) struct Fitted {
 /// What a fit leaves the runs weighted by, for those that go on from it: noise, its white part, limits and starts of every run,
 /// what the balances tell, and whether the drive is adjusted.
 #[derive(Debug)]
-struct Weighting {
+pub(super) struct Weighting {
     runs: Vec<([Noise; 3], Vec<Start>)>,
     energy_balance: Option<(f64, f64)>,
     quadrature_balance: Option<([f64; 2], f64)>,
@@ -547,8 +439,8 @@ const LARGEST_EXCESS: f64 = 4.0;
 /// To what share of it the drive has to bring a misfit that it is believed to explain.
 const DRIVES_SHARE: f64 = 0.5;
 /// Rounds of fit, noise and spikes: those that come before the drive is freed with the last, and the most there are.
-const ROUNDS: usize = 3;
-const MOST_ROUNDS: usize = 6;
+pub(super) const ROUNDS: usize = 3;
+pub(super) const MOST_ROUNDS: usize = 6;
 /// Weights that what is left contradicts by more than this factor call for another round.
 const SAME_NOISE: f64 = 1.5;
 

@@ -14,6 +14,7 @@ pub(crate) mod initial_guess;
 pub(crate) mod joint_fit;
 pub(crate) mod normal;
 pub(crate) mod propagation;
+mod quadrature_balance;
 pub(crate) mod residuals;
 pub(crate) mod restricted_likelihood;
 pub(crate) mod ring_down_agreement;

@@ -4,6 +4,8 @@
 //! ½Δ(1/τ)\\cos 2(θ-θ_τ)$$ A pattern that turns takes the mean of d over all directions; a ring-down takes d of one, which
 //! differs from it by what the gains differ and by the anisodamping, that the angle tells. Another resonator takes another.
 
+use std::collections::BTreeSet;
+
 use cvg_model::effects::EffectId;
 
 use crate::error::Refusal;
@@ -152,10 +154,13 @@ pub(crate) fn spread_of_dampings(all: &[RingDown], hypothesis: &Hypothesis) -> f
     if low > 0.0 { high / low - 1.0 } else { 0.0 }
 }
 
-/// Whether four ring-downs or more are of one resonator by an anisodamping of their own, 1/τ = c + A cos 2θ + B sin 2θ: then it is the
+/// Whether ring-downs in four directions or more, told to ten degrees, are of one resonator by an anisodamping of their own, 1/τ = c + A cos 2θ + B sin 2θ: then it is the
 /// rotations' that is off, for want of an effect that they lack.
 fn agree_by_themselves(all: &[RingDown]) -> bool {
-    if all.len() <= OWN_UNKNOWNS {
+    #[allow(clippy::cast_possible_truncation, reason = "below 18")]
+    let direction = |r: &RingDown| (r.angle_rad.to_degrees().rem_euclid(180.0) * 0.1).round() as i64 % 18;
+    // one that repeats a direction bears out nothing of the others
+    if all.iter().map(direction).collect::<BTreeSet<_>>().len() <= OWN_UNKNOWNS {
         return false;
     }
     let row = |r: &RingDown| {
@@ -208,4 +213,37 @@ fn contradictions(all: &[RingDown], hypothesis: &Hypothesis, usual: Option<f64>)
         )
     };
     odd.iter().map(told).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ring-downs in these directions, deg, of 1/τ = 0.045 + 0.002 cos 2(θ − 27°), the damping of the last times `last`.
+    fn ring_downs(directions: &[f64], last: f64) -> Vec<RingDown> {
+        let damping = |deg: f64| 0.045 + 0.002 * (2.0 * (deg - 27.0).to_radians()).cos();
+        let of = |(at, deg): (usize, &f64)| {
+            let tau_s = (damping(*deg) * if at + 1 == directions.len() { last } else { 1.0 }).recip();
+            RingDown {
+                name: format!("{deg}"),
+                angle_rad: deg.to_radians(),
+                tau_s,
+                tau_error_s: 1e-3 * tau_s,
+                uneven: 0.0,
+                drive: -0.045,
+                drive_error: 1e-5,
+                decay: Vec::new(),
+            }
+        };
+        directions.iter().enumerate().map(of).collect()
+    }
+
+    #[test]
+    fn four_directions_of_one_resonator_agree_and_a_foreign_one_or_a_repeated_one_bears_nothing_out() {
+        assert!(agree_by_themselves(&ring_downs(&[0.0, 45.0, 90.0, 135.0], 1.0)));
+        assert!(!agree_by_themselves(&ring_downs(&[0.0, 45.0, 90.0, 135.0], 1.04)));
+        assert!(!agree_by_themselves(&ring_downs(&[0.0, 45.0, 90.0], 1.0)));
+        // any two dampings are those of some anisodamping
+        assert!(!agree_by_themselves(&ring_downs(&[0.0, 180.0, 90.0, 90.0], 1.0)));
+    }
 }

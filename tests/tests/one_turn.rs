@@ -1,0 +1,123 @@
+//! Angle sensors as engineers hand them over: one turn in one file, ten headings, one pass, half a turn, an angle in another unit.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::recording::Role;
+use cvg_calibration::report::Status;
+use cvg_tests::angle_sensor::{Noise, a_row_a_second, angle_at, find, held_out, identified, read_at, sensor};
+
+fn role(held: bool) -> Role {
+    if held { Role::Holdout } else { Role::Fit }
+}
+
+/// The error of a magnetic encoder, deg: two harmonics that are large and a tail of small ones, as real ones have.
+fn encoder_error(degrees: f64) -> f64 {
+    let of = |n: u32| {
+        let size = [0.0, 0.5, 0.4, 0.02, 0.05].get(n as usize).copied().unwrap_or(0.15 / f64::from(n * n));
+        size * (f64::from(n) * degrees + f64::from(70 * n * n)).to_radians().cos()
+    };
+    (1..=24).map(of).sum()
+}
+
+/// One turn in one file, its last quarter held out: blocks of rows on either side of which others stand say nothing of a part of the turn
+/// with none, and a table of 12 harmonics, or 32, left more there than there was.
+#[test]
+fn the_last_quarter_of_one_turn_is_predicted_by_a_table_that_reaches_there() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let theta = |degrees: f64| degrees + encoder_error(degrees) + 0.01 * noise.sample();
+        let stations: Vec<f64> = (0..1000).map(|i| f64::from(i / 5) * 1.8).collect();
+        let i = identified(sensor(vec![a_row_a_second(stations, theta, Role::Fit)]));
+        let raw = i.report.heldout.raw.unwrap().rms_deg;
+        println!("seed {seed}: {raw:.3}° to {:.3}°", held_out(&i));
+        assert!(held_out(&i) < 0.5 * raw, "seed {seed}: {}° left of {raw}°", held_out(&i));
+    }
+}
+
+/// A deviation card: ten headings, and forty others at which they are tried.
+#[test]
+fn ten_stations_tell_two_harmonics_that_are_most_of_what_there_is() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let mut at = |step: f64, first: f64, count: u32, role| {
+            let theta = |degrees: f64| {
+                let a = degrees.to_radians();
+                degrees + 0.6 * a.sin() + 0.5 * (2.0 * a).cos() + 0.01 * noise.sample()
+            };
+            angle_at((0..count).map(|i| first + step * f64::from(i)).collect(), theta, role)
+        };
+        let i = identified(sensor(vec![at(36.0, 0.0, 10, Role::Fit), at(9.0, 4.5, 40, Role::Holdout)]));
+        assert!(held_out(&i) < 0.05, "seed {seed}: {}°", held_out(&i));
+        // and of noise nothing is made
+        let mut alone = |step: f64, first: f64, count: u32, role| {
+            let theta = |degrees: f64| degrees + 0.05 * noise.sample();
+            angle_at((0..count).map(|i| first + step * f64::from(i)).collect(), theta, role)
+        };
+        let campaign = sensor(vec![alone(36.0, 0.0, 10, Role::Fit), alone(9.0, 4.5, 40, Role::Holdout)]);
+        assert_eq!(identified(campaign).report.status, Status::Neutral, "seed {seed}");
+    }
+}
+
+/// Stations at uneven distances in one pass, a second each: the rate from row to row is a function of the position, as is a table of 16
+/// harmonics.
+#[test]
+fn in_one_pass_what_goes_with_the_motion_is_a_table() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let mut at = |held: bool| {
+            let stations = (0..256).filter(|i| (i % 2 == 1) == held);
+            let degrees = |i: u32| 1.40625 * f64::from(i) + 0.5 * (12.0 * 1.40625 * f64::from(i)).to_radians().sin();
+            let places: Vec<f64> = stations.map(degrees).collect();
+            let error =
+                |a: f64| 0.3 * a.sin() + 0.2 * (2.0 * a).cos() + 0.3 * (12.0 * a).cos() + 0.1 * (14.0 * a).sin();
+            let theta = |d: f64| d + error(d.to_radians()) + 0.02 * noise.sample();
+            a_row_a_second(places, theta, role(held))
+        };
+        let i = identified(sensor(vec![at(false), at(true)]));
+        let of_motion = |id: &&str| find(&i, id).is_some();
+        assert_eq!(["angle-latency", "acceleration-lag"].iter().find(|id| of_motion(id)), None, "seed {seed}");
+        assert!(held_out(&i) < 1.5 * 0.02, "seed {seed}: {}°", held_out(&i));
+    }
+}
+
+/// Twelve stations, a hundred rows at each, of which every third is held out: through four any ellipse goes.
+#[test]
+fn a_run_at_four_stations_is_not_of_another_sensor() {
+    let at = |held: bool, seed: u64| {
+        let stations = (0..12).filter(|i| (i % 3 == 2) == held);
+        let angles: Vec<f64> = stations.flat_map(|i| std::iter::repeat_n(30.0 * f64::from(i), 100)).collect();
+        // an eccentric magnet is no ellipse
+        let (x, y) = angles.iter().map(|a| (a + 3.0 * (3.0 * a).to_radians().sin()).to_radians().sin_cos()).unzip();
+        let mut noise = Noise::new(seed);
+        let mut noisy = |v: Vec<f64>| v.into_iter().map(|v| v + 3e-4 * noise.sample()).collect();
+        let (y, x) = (noisy(x), noisy(y));
+        read_at(angles, x, y, role(held))
+    };
+    let i = identified(sensor(vec![at(false, 1), at(true, 2)]));
+    assert!(i.report.warnings.iter().all(|w| !w.contains("left out")), "{:#?}", i.report.warnings);
+}
+
+/// Half a turn, of which the last row stands half a degree short; and a turn of which three quarters of the rows stand in its first half.
+#[test]
+fn half_a_turn_is_as_much_as_its_rows_and_its_held_out_part_say() {
+    let mut noise = Noise::new(5);
+    let mut theta = |degrees: f64| degrees + 0.6 * degrees.to_radians().sin() + 0.01 * noise.sample();
+    let half =
+        |held: bool| (0..360).filter(move |i| (i % 4 == 3) == held).map(|i| 0.5 * f64::from(i)).collect::<Vec<f64>>();
+    let halves = vec![angle_at(half(false), &mut theta, Role::Fit), angle_at(half(true), &mut theta, Role::Holdout)];
+    assert!(held_out(&identified(sensor(halves))) < 0.05);
+    let slow_then_fast = (0..300).map(|i| 0.59 * f64::from(i)).chain((0..100).map(|i| 178.0 + 1.8 * f64::from(i)));
+    let turn = sensor(vec![angle_at(slow_then_fast.collect(), &mut theta, Role::Fit)]);
+    assert_ne!(identified(turn).report.status, Status::Refused);
+}
+
+/// An angle in radians turns a sixtieth as far as its gain says: nothing is left of it beside the best line.
+#[test]
+fn an_angle_in_another_unit_beside_a_stated_gain_is_refused_and_the_unit_named() {
+    let mut theta = |degrees: f64| (degrees + 0.6 * degrees.to_radians().sin()).to_radians();
+    let every =
+        |held: bool| (0..200).filter(move |i| (i % 2 == 1) == held).map(|i| 1.8 * f64::from(i)).collect::<Vec<f64>>();
+    let runs = vec![angle_at(every(false), &mut theta, Role::Fit), angle_at(every(true), &mut theta, Role::Holdout)];
+    let refusal =
+        cvg_calibration::identify(sensor(runs), &cvg_calibration::Options::default()).unwrap_err().to_string();
+    assert!(refusal.contains("does not follow the reference") && refusal.contains("in rad"), "{refusal}");
+}
