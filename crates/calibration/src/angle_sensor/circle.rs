@@ -5,12 +5,11 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use super::model::by_run;
 use super::readout::{Readout, UNKNOWNS};
 use super::readout_fit::centre;
 use super::samples::SensorRun;
 use super::sensor::Sensor;
-use super::table_fit::{Shape, TableFit};
+use super::table_fit::{Shape, TableFit, by_run};
 use crate::numerics::statistics::root_mean_square;
 
 /// A part of a readout shows where the radius varies by this share at least of what the part by itself does to it: engineering

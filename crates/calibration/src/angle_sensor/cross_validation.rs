@@ -18,6 +18,9 @@ const PERIODS_OF_ONE: f64 = 1.75;
 /// asked for the other half. Engineering choices.
 const GAP: std::ops::Range<f64> = 0.15..0.4;
 const ALONE: f64 = 2.0;
+/// The share of what is asked for that lies in such a part, and how far from its edges, as a share of the period. Engineering choices.
+const ASKED: f64 = 0.1;
+const EDGE: f64 = 0.02;
 /// Whole runs are left out from this many on.
 const FEWEST_RUNS: usize = 3;
 /// Standard errors that one more line has to gain.
@@ -66,14 +69,14 @@ pub(crate) struct Folds {
 
 impl Folds {
     /// Whole runs where three or more cover the period; fifths in time where one run repeats it; fifths of the way where a part of
-    /// the period has no row, for there the model is asked too; else interleaved blocks.
-    pub(crate) fn of(runs: &[SensorRun], cycles_per_rad: f64) -> Self {
+    /// the period has no row and the model is asked for the angle there, at a reference of `asked`; else interleaved blocks.
+    pub(crate) fn of(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> Self {
         let periods: Vec<f64> = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU).collect();
         let least = periods.iter().copied().fold(f64::INFINITY, f64::min);
         let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
         let whole = runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS;
         let fifths = runs.len() == 1 && least > PERIODS_OF_ONE;
-        if !whole && !fifths && lacks_a_part(runs, cycles_per_rad) {
+        if !whole && !fifths && lacks_a_part(runs, asked, cycles_per_rad) {
             return Self { about_mean: true, ..Self::of_the_way(runs) };
         }
         for (number, run) in runs.iter().enumerate() {
@@ -146,15 +149,21 @@ impl Folds {
     }
 }
 
-/// Whether one part of the period has no row, as where the last quarter of a turn is held out.
-fn lacks_a_part(runs: &[SensorRun], cycles_per_rad: f64) -> bool {
+/// Whether one part of the period has no row, and some of what is asked for lies in it, as where the last quarter of a turn is held out.
+fn lacks_a_part(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> bool {
     let place = |a: &f64| (a * cycles_per_rad / std::f64::consts::TAU).rem_euclid(1.0);
     let mut places: Vec<f64> = runs.iter().flat_map(|r| r.reference_rad.iter().map(place)).collect();
     places.sort_by(f64::total_cmp);
-    let around = places.first().zip(places.last()).map_or(1.0, |(first, last)| 1.0 + first - last);
-    let steps = places.windows(2).map(|w| w[1] - w[0]).chain([around]);
-    let [widest, next] = steps.fold([0.0; 2], |[a, b], step| if step > a { [step, a] } else { [a, step.max(b)] });
-    GAP.contains(&widest) && widest > ALONE * next
+    let Some((first, last)) = places.first().copied().zip(places.last().copied()) else { return false };
+    let ends = places.windows(2).map(|w| [w[0], w[1]]).chain([[last, 1.0 + first]]);
+    let mut gaps: Vec<[f64; 2]> = ends.collect();
+    gaps.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    let [from, width] = [gaps[0][0], gaps[0][1] - gaps[0][0]];
+    let next = gaps.get(1).map_or(0.0, |g| g[1] - g[0]);
+    // rows that are held out among those that are fitted stand at its very edge at most
+    let within = |a: &&f64| (EDGE..width - EDGE).contains(&(place(a) - from).rem_euclid(1.0));
+    let is_asked = asked.iter().filter(within).count() as f64 >= ASKED * asked.len() as f64 && !asked.is_empty();
+    GAP.contains(&width) && width > ALONE * next && is_asked
 }
 
 /// Squared errors of left-out rows, by block.

@@ -5,11 +5,11 @@ use cvg_model::effects::{EffectId, MAX_PARAMETERS, Parameter, Values};
 
 use super::circle::{OF_A_READOUT, ln_radius};
 use super::effects::{LIBRARY_VALUES, LibraryReadout};
-use super::model::{SensorModel, by_run};
+use super::model::SensorModel;
 use super::readout::{Kind, Readout, Unknown};
 use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
-use super::table_fit::TableFit;
+use super::table_fit::{TableFit, by_run};
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::numerics::linear::NormalEquations;
 

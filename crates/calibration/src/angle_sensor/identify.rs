@@ -6,7 +6,7 @@ use super::cross_axis;
 use super::deviations::{Deviations, deviations, own_gain_ratios};
 use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
-use super::model::{Outcome, SensorModel};
+use super::model::{Outcome, SensorModel, positions};
 use super::odd_runs::without_odd_runs;
 use super::rate_finding::rate_finding;
 use super::rate_runs;
@@ -149,7 +149,8 @@ pub(crate) fn identify(
         rate_finding(stated, period, &fitted, &held)?
     } else {
         let all: Vec<usize> = fitted.iter().map(|run| run.number).collect();
-        let identify = |runs: &[SensorRun]| SensorModel::identify(stated, period, runs, &texts);
+        let asked_for = positions(&held);
+        let identify = |runs: &[SensorRun]| SensorModel::identify(stated, period, runs, &texts, &asked_for);
         let model;
         (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
         held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
@@ -286,7 +287,7 @@ fn competing(effects: &[EffectId], runs: &[SensorRun]) -> (Vec<EffectId>, Option
 fn identified(
     asked: Asked,
     mut model: SensorModel,
-    runs: &[SensorRun],
+    [runs, held]: [&[SensorRun]; 2],
     mut texts: Vec<EffectId>,
 ) -> Result<(SensorModel, Deviations), Refusal> {
     loop {
@@ -297,7 +298,7 @@ fn identified(
             return Ok((model, deviations));
         }
         texts.retain(|id| !unsure.contains(id));
-        model = SensorModel::identify(asked.stated, asked.period, runs, &texts)?;
+        model = SensorModel::identify(asked.stated, asked.period, runs, &texts, &positions(held))?;
     }
 }
 
@@ -322,7 +323,7 @@ fn sensor_finding(
     texts: Vec<EffectId>,
 ) -> Result<Finding<'static>, Refusal> {
     let Asked { stated, sense, period, rates_alone } = asked;
-    let (model, mut deviations) = identified(asked, model, runs, texts)?;
+    let (model, mut deviations) = identified(asked, model, [runs, held], texts)?;
     if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
         thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
     }
@@ -499,6 +500,6 @@ pub(super) fn take_apart(samples: &[Sample], runs: &[SensorRun], cycles: f64, ga
         influences.push(Influence { of: "direction", columns: vec![column(&|s| s.rate.signum())] });
     }
     // each run has a constant of its own
-    let errors = super::model::by_run(samples, runs.len(), |s| s.error).concat();
+    let errors = super::table_fit::by_run(samples, runs.len(), |s| s.error).concat();
     decompose(&errors, &influences)
 }

@@ -8,11 +8,11 @@ use super::deviations::Deviations;
 use super::lines::alias_elsewhere;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
-use super::readout_fit::{Weighting, centre, fit};
+use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
 use super::selection::{Front, Selected, Selection, fit_from, starts};
 use super::sensor::Sensor;
-use super::table_fit::{Motion, Sample, Shape, TableFit};
+use super::table_fit::{Motion, Shape, TableFit, by_run};
 use super::{autoregression, ellipse};
 use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
@@ -55,7 +55,7 @@ pub(crate) struct SensorModel {
 }
 
 impl SensorModel {
-    /// Identifies a sensor from the runs to fit, with effects as text that compete.
+    /// Identifies a sensor from the runs to fit, with effects as text that compete, for positions of the reference that are `asked` for.
     ///
     /// # Errors
     /// Where nothing is left that can be inverted.
@@ -64,6 +64,7 @@ impl SensorModel {
         period: f64,
         runs: &[SensorRun],
         texts: &[EffectId],
+        asked: &[f64],
     ) -> Result<Self, Refusal> {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         if runs.iter().all(|r| r.commanded && r.channels().is_some()) {
@@ -74,7 +75,7 @@ impl SensorModel {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
-        let mut selection = Selection::new(&sensor, runs, rails, &starts, texts);
+        let mut selection = Selection::new(&sensor, runs, rails, &starts, texts, asked);
         let selected = selection.select();
         let refusal = || {
             Refusal::no_answer(
@@ -238,8 +239,6 @@ impl SensorModel {
     /// The model where the angle of `asked` is asked for, without the lines of the reference's turn that stations at even distances do
     /// not tell from another there, each with that other.
     pub(crate) fn where_asked(&self, fitted: &[SensorRun], asked: &[SensorRun]) -> (Self, Vec<[u32; 2]>) {
-        let positions =
-            |runs: &[SensorRun]| -> Vec<f64> { runs.iter().flat_map(|r| r.reference_rad.iter().copied()).collect() };
         let (fitted, asked) = (positions(fitted), positions(asked));
         let mut there = self.clone();
         let mut others = Vec::new();
@@ -259,12 +258,7 @@ impl SensorModel {
     }
 }
 
-/// A value of the samples of each run.
-pub(crate) fn by_run(samples: &[Sample], runs: usize, value: impl Fn(&Sample) -> f64) -> Vec<Vec<f64>> {
-    let mut out = vec![Vec::new(); runs];
-    for s in samples {
-        out[s.run].push(value(s));
-    }
-    out.iter_mut().for_each(|v| centre(v));
-    out
+/// Where the reference stands in the rows of all runs, rad.
+pub(crate) fn positions(runs: &[SensorRun]) -> Vec<f64> {
+    runs.iter().flat_map(|r| r.reference_rad.iter().copied()).collect()
 }

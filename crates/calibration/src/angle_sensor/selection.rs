@@ -110,12 +110,13 @@ impl<'a> Selection<'a> {
         rails: Rails,
         starts: &[Readout],
         texts: &[EffectId],
+        asked: &[f64],
     ) -> Self {
         let rows: usize = fit_runs.iter().map(SensorRun::len).sum();
         let stride = (rows / ENOUGH_ROWS).max(1);
         let runs: Vec<SensorRun> =
             fit_runs.iter().map(|r| if stride > 1 { r.thinned(stride) } else { r.clone() }).collect();
-        let folds = Folds::of(&runs, sensor.gain.abs() * sensor.cycles);
+        let folds = Folds::of(&runs, asked, sensor.gain.abs() * sensor.cycles);
         let (starts, texts) = (starts.to_vec(), texts.to_vec());
         let stations = stations(sensor, &runs);
         Self { sensor, runs, folds, rails, starts, texts, stations, without: BTreeMap::new() }
@@ -566,7 +567,7 @@ mod tests {
         let across = |run: SensorRun| {
             let runs = [run];
             let sensor = Sensor { gain: 1.0, free_gain: false, period: std::f64::consts::TAU, cycles: 1.0 };
-            let selection = Selection::new(&sensor, &runs, Rails::none(), &[], &[]);
+            let selection = Selection::new(&sensor, &runs, Rails::none(), &[], &[], &[]);
             let long = Shape { form: Form::Own, order: 16, ..Shape::constant(false) };
             selection.across_gaps(&(None, long)).map(|(shape, _)| shape.order)
         };

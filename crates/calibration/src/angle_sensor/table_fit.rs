@@ -1,7 +1,9 @@
 //! The fit of a table, and beside it of how the angle follows motion and of isolated lines of the reference.
 
+use super::readout_fit::centre;
 use crate::model::angle_table::{AngleTable, Form};
 use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::root_mean_square;
 
 /// How the angle follows motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -75,6 +77,12 @@ pub(crate) struct Sample {
 const STEPS: usize = 6;
 const CONVERGED: f64 = 1e-9;
 
+/// A coefficient of a table above this many times the scatter of the errors is none of them: rows over a part of the period leave
+/// harmonics that nearly cancel there as they like, and the angle would be off by as much in the rest.
+const LARGEST_COEFFICIENT: f64 = 5.0;
+/// Least share of that scatter that counts as noise where coefficients are held to it.
+const LEAST_NOISE: f64 = 1e-3;
+
 /// A fitted table with all that stands beside it.
 #[derive(Debug, Clone)]
 pub(crate) struct TableFit {
@@ -134,8 +142,24 @@ pub(crate) fn only_phase(n: f64, samples: &[Sample]) -> Option<[f64; 2]> {
 }
 
 impl TableFit {
-    /// Fits the shape to samples of `runs` runs; `None` where the forward form has no inverse.
+    /// Fits the shape to samples of `runs` runs; `None` where the forward form has no inverse. Coefficients that come out larger than
+    /// errors of this scatter can have are fitted anew, each believed to be no larger (ridge regression, Hoerl and Kennard 1970, with the
+    /// ratio of the variances of noise and errors).
     pub(crate) fn new(shape: &Shape, samples: &[Sample], runs: usize, cycles: f64) -> Option<Self> {
+        let free = Self::believing(shape, samples, runs, cycles, 0.0)?;
+        let scatter = root_mean_square(&by_run(samples, runs, |s| s.error).concat());
+        let largest = free.table.cos.iter().chain(&free.table.sin).fold(0.0, |m: f64, c| m.max(c.abs()));
+        if largest <= LARGEST_COEFFICIENT * scatter {
+            return Some(free);
+        }
+        let left: f64 = samples.iter().filter_map(|s| Some((free.left(s) - free.constants[s.run]?).powi(2))).sum();
+        let degrees_of_freedom = samples.len().saturating_sub(shape.size() + runs).max(1) as f64;
+        let share = (left / degrees_of_freedom).sqrt().max(LEAST_NOISE * scatter) / scatter;
+        Self::believing(shape, samples, runs, cycles, share)
+    }
+
+    /// The fit where each coefficient is believed to be nothing, as much as one row is believed `noise` times.
+    fn believing(shape: &Shape, samples: &[Sample], runs: usize, cycles: f64, noise: f64) -> Option<Self> {
         let mut column = vec![None; runs];
         let mut present = 0;
         for s in samples {
@@ -172,6 +196,12 @@ impl TableFit {
                 row.extend(sides.iter().map(|v| v * (1.0 + slope)));
                 push_harmonics(cycles * at, order, &mut row);
                 equations.add(&row, s.error - moved - value);
+            }
+            for at in (present + side..x.len()).filter(|_| noise > 0.0) {
+                row.clear();
+                row.resize(x.len(), 0.0);
+                row[at] = noise;
+                equations.add(&row, -noise * x[at]);
             }
             let step = equations.solve();
             for (a, b) in x.iter_mut().zip(&step) {
@@ -211,6 +241,16 @@ impl TableFit {
         let moved: f64 = sides.iter().zip(&self.side).map(|(a, b)| a * b).sum();
         s.error + (self.table.undo(s.theta, self.cycles) - s.theta) - moved
     }
+}
+
+/// A value of the samples of each run, about its mean.
+pub(crate) fn by_run(samples: &[Sample], runs: usize, value: impl Fn(&Sample) -> f64) -> Vec<Vec<f64>> {
+    let mut out = vec![Vec::new(); runs];
+    for s in samples {
+        out[s.run].push(value(s));
+    }
+    out.iter_mut().for_each(|v| centre(v));
+    out
 }
 
 fn series(form: Form, coefficients: &[f64]) -> AngleTable {

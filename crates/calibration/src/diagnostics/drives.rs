@@ -1,13 +1,14 @@
-//! Whether the drives put out what they are commanded. The quadrature balance, q̇/a = G f_qc/a + ½(Δω sin 2θ_ω cos 2θ −
+//! Whether the drives put out what they are commanded. The quadrature balance, q̇/a = G (f_qc − f_0)/a + ½(Δω sin 2θ_ω cos 2θ −
 //! Δω cos 2θ_ω sin 2θ), has the force itself in it: drives that clip at a level break it wherever a command is beyond that, and
-//! no share of the angle says as much, since the energy command that clips with it is small beside what holds a split.
+//! no share of the angle says as much, since the energy command that clips with it is small beside what holds a split. The offset
+//! f_0 of the command, its converter's or its logger's, is adjusted with it.
 //!
 //! It refuses to look at the angle. A fit of that takes the level from here, with its uncertainty.
 
 use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, Stage, Values};
 use cvg_model::{AxisForces, Envelope};
-use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix5, Vector5};
 
 use crate::data::track::Track;
 use crate::estimation::joint_fit::Dataset;
@@ -56,6 +57,8 @@ struct Pair {
     /// of the pattern, mean
     cos2: f64,
     sin2: f64,
+    /// mean of 1/a, 1/V
+    per_amplitude: f64,
     /// largest force around it, V
     largest: f64,
     around: [Instant; 4],
@@ -98,6 +101,7 @@ fn pairs(track: &Track, hypothesis: &Hypothesis, out: &mut Vec<Pair>, stride: us
             q: 0.5 * (before + after),
             cos2: mean(&around, |at| at.axis.cos * at.axis.cos - at.axis.sin * at.axis.sin),
             sin2: mean(&around, |at| 2.0 * at.axis.sin * at.axis.cos),
+            per_amplitude: mean(&around, |at| at.per_amplitude),
             largest: around.iter().map(|at| size(&at.volts)).fold(0.0, f64::max),
             around,
         });
@@ -139,22 +143,28 @@ impl Balance {
         })
     }
 
-    /// Mean square of what is left of q̇/a with the force scale, the split and the damping that leave least.
+    /// Mean square of what is left of q̇/a with the force scale, the split, the damping and the offset that leave least.
     fn left(&self, inverse_level: f64) -> f64 {
         let row = |(p, unclipped): (&Pair, &f64)| {
             let clips = p.largest * inverse_level > 1.0;
-            Vector4::new(if clips { self.pushed(p, inverse_level) } else { *unclipped }, p.sin2, p.cos2, p.q)
+            Vector5::new(
+                if clips { self.pushed(p, inverse_level) } else { *unclipped },
+                p.sin2,
+                p.cos2,
+                p.q,
+                p.per_amplitude,
+            )
         };
-        let rows: Vec<Vector4<f64>> = self.pairs.iter().zip(&self.unclipped).map(row).collect();
-        let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+        let rows: Vec<Vector5<f64>> = self.pairs.iter().zip(&self.unclipped).map(row).collect();
+        let (mut normal, mut right) = (Matrix5::zeros(), Vector5::zeros());
         for (row, pair) in rows.iter().zip(&self.pairs) {
             normal += row * row.transpose();
             right += row * pair.widening;
         }
         let dynamic =
-            (DMatrix::from_column_slice(4, 4, normal.as_slice()), DVector::from_column_slice(right.as_slice()));
-        let found = Vector4::from_vec(NormalEquations::of(dynamic.0, dynamic.1).solve());
-        let off = |(row, pair): (&Vector4<f64>, &Pair)| (pair.widening - row.dot(&found)).powi(2);
+            (DMatrix::from_column_slice(5, 5, normal.as_slice()), DVector::from_column_slice(right.as_slice()));
+        let found = Vector5::from_vec(NormalEquations::of(dynamic.0, dynamic.1).solve());
+        let off = |(row, pair): (&Vector5<f64>, &Pair)| (pair.widening - row.dot(&found)).powi(2);
         rows.iter().zip(&self.pairs).map(off).sum::<f64>() / self.pairs.len() as f64
     }
 

@@ -8,6 +8,7 @@
 use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
+use crate::data::track::Track;
 use crate::estimation::fit::{Prepared, scaled_inverse};
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Unknown};
@@ -49,35 +50,13 @@ pub(crate) fn energy_balance(
     if let Some(member) = hypothesis.position(EffectId::Anisodamping) {
         free.extend([Unknown::Effect(member, 0), Unknown::Effect(member, 1)]);
     }
-    let n = free.len();
     let unknowns = Unknowns::new(hypothesis, free);
     // the drive replaces the damping and hardly differs from it: counted from that, what is left of it shows
     let replaced = usual_growth(tracks);
-    // squares of the slopes and, last, of what is left of ln a
-    let mut squares = DMatrix::zeros(n + 1, n + 1);
-    let mut count = 0.0;
-    for (p, starts) in tracks.iter().zip(starts) {
-        for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
-            let (mut origin, mut sum, mut samples) = (None, DVector::zeros(n + 1), 0.0);
-            let stepping = Stepping::without(p.limit.angle);
-            propagate(&p.track, segment, hypothesis, &unknowns, *start, stepping, |row| {
-                if row.angle.abs() > stepping.spike {
-                    return;
-                }
-                let columns = row.amplitude_slopes.iter().copied().chain([row.amplitude]);
-                let mut columns = DVector::from_iterator(n + 1, columns);
-                columns[0] += replaced * columns[1];
-                columns -= &*origin.get_or_insert_with(|| columns.clone());
-                squares.syger(1.0, &columns, &columns, 1.0);
-                sum += columns;
-                samples += 1.0;
-            });
-            // each segment starts at an amplitude of its own
-            squares.syger(-1.0 / f64::max(samples, 1.0), &sum, &sum, 1.0);
-            count += samples;
-        }
-    }
-    squares.fill_upper_triangle_with_lower_triangle();
+    let counted = |columns: &mut DVector<f64>| columns[0] += replaced * columns[1];
+    let sums = stretches(tracks, hypothesis, &unknowns, starts, |_| f64::INFINITY, counted);
+    let (n, count) = (unknowns.all.len(), sums.iter().map(|s| s.samples).sum::<f64>());
+    let squares = sums.iter().map(|s| &s.squares).sum::<DMatrix<f64>>();
     let inverse = scaled_inverse(&squares.view((0, 0), (n, n)).into_owned(), 0.0)?;
     let step: DVector<f64> = &inverse * squares.column(n).rows(0, n);
     let left = DVector::from_fn(n + 1, |i, _| if i < n { -step[i] } else { 1.0 });
@@ -92,6 +71,61 @@ pub(crate) fn energy_balance(
         closed,
         information: 1.0 / inverse[(0, 0)].max(f64::MIN_POSITIVE),
     })
+}
+
+/// What a stretch of a run says of the balance: squares of the slopes and, last, of what is left of ln a, about their means, since
+/// every stretch starts at an amplitude of its own.
+pub(super) struct Stretch {
+    pub(super) squares: DMatrix<f64>,
+    samples: f64,
+}
+
+/// The fitted segments in stretches of a length of each run's own, s; `counted` changes what the slopes, and what is left, are counted
+/// from.
+pub(super) fn stretches(
+    tracks: &[Prepared],
+    hypothesis: &Hypothesis,
+    unknowns: &Unknowns,
+    starts: &[Vec<Start>],
+    length_s: impl Fn(&Track) -> f64,
+    counted: impl Fn(&mut DVector<f64>),
+) -> Vec<Stretch> {
+    let n = unknowns.all.len();
+    let mut all = Vec::new();
+    for (p, starts) in tracks.iter().zip(starts) {
+        let length_s = length_s(&p.track);
+        for (segment, start) in p.track.segments.iter().zip(starts).filter(|(s, _)| s.role == Role::Fit) {
+            let nothing = || (DMatrix::zeros(n + 1, n + 1), DVector::zeros(n + 1), 0.0);
+            let (mut squares, mut sum, mut samples): (DMatrix<f64>, DVector<f64>, f64) = nothing();
+            let mut end = |squares: &mut DMatrix<f64>, sum: &DVector<f64>, samples: f64| {
+                squares.syger(-1.0 / f64::max(samples, 1.0), sum, sum, 1.0);
+                squares.fill_upper_triangle_with_lower_triangle();
+                all.push(Stretch { squares: squares.clone(), samples });
+            };
+            let mut origin: Option<(f64, DVector<f64>)> = None;
+            let stepping = Stepping::without(p.limit.angle);
+            propagate(&p.track, segment, hypothesis, unknowns, *start, stepping, |row| {
+                if row.angle.abs() > stepping.spike {
+                    return;
+                }
+                let columns = row.amplitude_slopes.iter().copied().chain([row.amplitude]);
+                let mut columns = DVector::from_iterator(n + 1, columns);
+                counted(&mut columns);
+                let t_s = p.track.t_s[row.index];
+                if origin.as_ref().is_some_and(|(began_s, _)| t_s - began_s >= length_s) {
+                    end(&mut squares, &sum, samples);
+                    (squares, sum, samples) = nothing();
+                    origin = None;
+                }
+                columns -= &origin.get_or_insert_with(|| (t_s, columns.clone())).1;
+                squares.syger(1.0, &columns, &columns, 1.0);
+                sum += columns;
+                samples += 1.0;
+            });
+            end(&mut squares, &sum, samples);
+        }
+    }
+    all
 }
 
 /// The median of ȧ/a by the energy command at a force scale of 1, 1/s.

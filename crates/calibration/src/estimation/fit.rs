@@ -44,7 +44,7 @@ impl Prior {
     }
 
     /// The deviation of `unknown`, if these priors hold it as a considered one.
-    pub(super) fn considered_deviation(priors: &[Self], unknown: Unknown) -> Option<f64> {
+    pub(crate) fn considered_deviation(priors: &[Self], unknown: Unknown) -> Option<f64> {
         priors.iter().find(|p| p.considered && p.unknown == unknown).map(|p| p.deviation)
     }
 }

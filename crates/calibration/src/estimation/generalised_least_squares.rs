@@ -65,7 +65,20 @@ struct Problem<'a> {
     priors: &'a [Prior],
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    fn new(tracks: &'a [Prepared], fit: &Fit, priors: &'a [Prior]) -> Self {
+        let ratio = |u: &Unknown| match u {
+            Unknown::Effect(member, 0) => fit.hypothesis.members[*member].id == EffectId::DetectionGainMismatch,
+            _ => false,
+        };
+        Self {
+            tracks,
+            unknowns: Unknowns::new(&fit.hypothesis, fit.unknowns.clone()),
+            ratio: fit.unknowns.iter().position(ratio),
+            priors,
+        }
+    }
+
     fn segments(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let all = self.tracks.iter().enumerate();
         all.flat_map(|(t, p)| p.track.segments.iter().enumerate().map(move |(s, segment)| (t, s, segment.role)))
@@ -177,23 +190,14 @@ impl Part {
 
 /// Moves `fit` by its last steps and says the covariance of its unknowns; `None` where nothing was fitted.
 pub(crate) fn refine(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option<Refined> {
-    let ratio = |u: &Unknown| match u {
-        Unknown::Effect(member, 0) => fit.hypothesis.members[*member].id == EffectId::DetectionGainMismatch,
-        _ => false,
-    };
-    let problem = Problem {
-        tracks,
-        unknowns: Unknowns::new(&fit.hypothesis, fit.unknowns.clone()),
-        ratio: fit.unknowns.iter().position(ratio),
-        priors,
-    };
+    let problem = Problem::new(tracks, fit, priors);
     let noise = problem.noise(fit);
     let mut fit = fit.clone();
     let mut best: Option<(Fit, Vec<Part>, Normal)> = None;
     for _ in 0..STEPS {
         let parts = problem.parts(&fit, &noise);
         let mut normal = problem.beliefs(&fit);
-        parts.iter().for_each(|p| normal.add(&p.whitened));
+        parts.iter().for_each(|p| normal.add(&p.whitened, 1.0));
         if best.as_ref().is_some_and(|(_, _, before)| normal.squares > before.squares) {
             break;
         }
@@ -222,6 +226,25 @@ pub(crate) fn refine(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option
     Some(Refined { fit, covariance, disagreement })
 }
 
+/// The normal equations around `fit`, as far as what whitened samples leave, and what the runs disagree by, allow; `None` where nothing
+/// was fitted.
+pub(crate) fn linearised(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option<Normal> {
+    let problem = Problem::new(tracks, fit, priors);
+    let parts = problem.parts(fit, &problem.noise(fit));
+    let mut normal = problem.beliefs(fit);
+    parts.iter().for_each(|p| normal.add(&p.whitened, 1.0));
+    let worth = left(&parts, &normal, &normal.solution()?).max(disagreement(&parts, &normal)?).max(1.0).recip();
+    let mut scaled = problem.beliefs(fit);
+    parts.iter().for_each(|p| scaled.add(&p.whitened, worth));
+    Some(scaled)
+}
+
+/// What whitened samples are left, as a variance.
+fn left(parts: &[Part], normal: &Normal, solution: &Solution) -> f64 {
+    let count: usize = parts.iter().map(|p| p.whitened.count).sum();
+    (normal.squares - normal.right.dot(&solution.step)) / count.max(1) as f64
+}
+
 /// Covariance of the unknowns, and by what factor the runs' variances have to be larger for the runs to agree.
 ///
 /// The noise's part is multiplied by what whitened samples are left, and by the disagreement of the runs, where these are
@@ -229,10 +252,9 @@ pub(crate) fn refine(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option
 fn covariance(parts: &[Part], normal: &Normal) -> Option<(DMatrix<f64>, f64)> {
     let solution = normal.solution()?;
     let n = solution.step.len();
-    let count: usize = parts.iter().map(|p| p.whitened.count).sum();
-    let left = (normal.squares - normal.right.dot(&solution.step)) / count.max(1) as f64;
     let disagreement = disagreement(parts, normal)?;
-    let plain = &solution.by_noise * (left.max(disagreement).max(1.0) - 1.0) + &solution.covariance;
+    let plain =
+        &solution.by_noise * (left(parts, normal, &solution).max(disagreement).max(1.0) - 1.0) + &solution.covariance;
     let mut meat = DMatrix::from_diagonal(&normal.believed);
     let blocks: usize = parts.iter().map(|p| p.whitened.blocks).sum();
     let finite = blocks as f64 / blocks.saturating_sub(n).max(1) as f64;

@@ -58,8 +58,11 @@ pub(crate) struct Dataset {
     pub(crate) energy_balance: Option<(f64, f64)>,
     /// Δω along both axes and its uncertainty, rad/s, as the quadrature loop tells it
     pub(crate) quadrature_balance: Option<([f64; 2], f64)>,
-    /// the fit at hand holds Δω there: for want of an effect that is not in the model the angle takes it elsewhere
-    pub(crate) split_is_held: bool,
+    /// Δ(1/τ) along both axes and its uncertainty, 1/s, as the energy loop tells it
+    pub(crate) damping_balance: Option<([f64; 2], f64)>,
+    /// the effects that the fit at hand holds where a loop tells them: for want of an effect that is not in the model the angle takes
+    /// them elsewhere
+    pub(crate) held: Vec<EffectId>,
     /// 1/level at which the drives clip and its uncertainty, 1/V, as the quadrature balance tells it
     pub(crate) clipping: Option<(f64, f64)>,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
@@ -145,7 +148,8 @@ impl Dataset {
             written: Vec::new(),
             energy_balance: None,
             quadrature_balance: None,
-            split_is_held: false,
+            damping_balance: None,
+            held: Vec::new(),
             clipping: None,
             drive_is_free: false,
             drive_is_free_at_once: false,
@@ -183,6 +187,11 @@ impl Dataset {
     pub(crate) fn excess(&self) -> f64 {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
         median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
+    }
+
+    /// The median of the fitted runs' mean amplitudes, V.
+    pub(crate) fn usual_amplitude(&self) -> f64 {
+        median(&mut fitted_tracks(&self.tracks).map(Track::mean_amplitude).collect::<Vec<_>>())
     }
 
     /// rms of the commands over the amplitude, V/V.
@@ -224,6 +233,9 @@ impl Dataset {
         if let Some((split, deviation)) = self.quadrature_balance {
             (0..2).for_each(|p| measured(EffectId::Anisoelasticity, p, split[p], deviation));
         }
+        if let Some((anisodamping, deviation)) = self.damping_balance.filter(|_| self.holds(EffectId::Anisodamping)) {
+            (0..2).for_each(|p| measured(EffectId::Anisodamping, p, anisodamping[p], deviation));
+        }
         if let Some(d) = drive {
             measured(EffectId::ActuationGainMismatch, 0, d.ratio(), d.ratio() * d.ratio_error.max(1e-6));
         }
@@ -246,8 +258,8 @@ impl Dataset {
                 all.push(prior(Unknown::Effect(i, p), m.values[p], width));
             }
         }
-        if let Some(member) = hypothesis.position(EffectId::Anisoelasticity).filter(|_| self.split_is_held) {
-            for p in all.iter_mut().filter(|p| (0..2).any(|i| p.unknown == Unknown::Effect(member, i))) {
+        for member in self.held.iter().filter_map(|id| hypothesis.position(*id)) {
+            for p in all.iter_mut().filter(|p| matches!(p.unknown, Unknown::Effect(m, _) if m == member)) {
                 p.considered = true;
             }
         }
@@ -296,12 +308,30 @@ impl Dataset {
         (result, settled)
     }
 
+    /// Whether the fit at hand holds an effect where a loop tells it.
+    pub(super) fn holds(&self, id: EffectId) -> bool {
+        self.held.contains(&id)
+    }
+
+    /// Fits from `hypothesis` until what is left is what the fit was weighted by.
+    pub(super) fn fitted_anew(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Fit {
+        let (mut result, mut settled) = self.fitted(hypothesis, drive, Effort::FULL);
+        for _ in ROUNDS..MOST_ROUNDS {
+            if settled {
+                break;
+            }
+            (result, settled) = self.fitted(&result.hypothesis, drive, Effort::FULL);
+        }
+        result
+    }
+
     pub(super) fn weighting(&self) -> Weighting {
         Weighting {
             runs: self.tracks.iter().map(|p| ([p.noise, p.white, p.limit], p.starts.clone())).collect(),
             energy_balance: self.energy_balance,
             quadrature_balance: self.quadrature_balance,
-            split_is_held: self.split_is_held,
+            damping_balance: self.damping_balance,
+            held: self.held.clone(),
             drive_is_free: self.drive_is_free,
         }
     }
@@ -313,7 +343,8 @@ impl Dataset {
         }
         self.energy_balance = weighting.energy_balance;
         self.quadrature_balance = weighting.quadrature_balance;
-        self.split_is_held = weighting.split_is_held;
+        self.damping_balance = weighting.damping_balance;
+        self.held.clone_from(&weighting.held);
         self.drive_is_free = weighting.drive_is_free;
     }
 
@@ -407,7 +438,7 @@ pub(crate) struct Fitted {
     pub(crate) fit: Fit,
     pub(crate) ring_downs: Vec<RingDown>,
     pub(crate) drive: Option<DriveGains>,
-    weighting: Weighting,
+    pub(super) weighting: Weighting,
 }
 
 /// What a fit leaves the runs weighted by, for those that go on from it: noise, its white part, limits and starts of every run,
@@ -417,7 +448,8 @@ pub(super) struct Weighting {
     runs: Vec<([Noise; 3], Vec<Start>)>,
     energy_balance: Option<(f64, f64)>,
     quadrature_balance: Option<([f64; 2], f64)>,
-    split_is_held: bool,
+    damping_balance: Option<([f64; 2], f64)>,
+    held: Vec<EffectId>,
     drive_is_free: bool,
 }
 
@@ -439,8 +471,8 @@ const LARGEST_EXCESS: f64 = 4.0;
 /// To what share of it the drive has to bring a misfit that it is believed to explain.
 const DRIVES_SHARE: f64 = 0.5;
 /// Rounds of fit, noise and spikes: those that come before the drive is freed with the last, and the most there are.
-pub(super) const ROUNDS: usize = 3;
-pub(super) const MOST_ROUNDS: usize = 6;
+const ROUNDS: usize = 3;
+const MOST_ROUNDS: usize = 6;
 /// Weights that what is left contradicts by more than this factor call for another round.
 const SAME_NOISE: f64 = 1.5;
 
@@ -454,7 +486,7 @@ const SAME_NOISE: f64 = 1.5;
 pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis) -> Result<Fitted, Refusal> {
     let mut hypothesis = hypothesis.clone();
     hypothesis.control_latency_s = 0.0;
-    dataset.split_is_held = false;
+    dataset.held.clear();
     if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch)
         && !dataset.drive_is_free_at_once
     {

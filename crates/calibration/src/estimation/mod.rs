@@ -6,6 +6,7 @@ pub mod bias;
 pub(crate) mod coloured_noise;
 pub(crate) mod contrasts;
 pub(crate) mod cross_validation;
+mod damping_balance;
 pub(crate) mod divided;
 pub(crate) mod fit;
 pub(crate) mod generalised_least_squares;

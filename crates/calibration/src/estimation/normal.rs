@@ -49,11 +49,11 @@ impl Normal {
         own
     }
 
-    /// Adds what residuals say.
-    pub(crate) fn add(&mut self, w: &Whitened) {
-        self.matrix += &w.normal;
-        self.right += &w.right;
-        self.squares += w.squares;
+    /// Adds what residuals say, as far as they are worth it.
+    pub(crate) fn add(&mut self, w: &Whitened, worth: f64) {
+        self.matrix += &w.normal * worth;
+        self.right += &w.right * worth;
+        self.squares += w.squares * worth;
     }
 
     /// The step to the least sum of squares, and its covariance.

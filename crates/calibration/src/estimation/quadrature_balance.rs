@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::estimation::actuation::DriveGains;
 use crate::estimation::fit::{BEYOND_BELIEF, Effort, Fit};
-use crate::estimation::joint_fit::{BALANCE_SHARE, Dataset, MOST_ROUNDS, ROUNDS, fitted_tracks};
+use crate::estimation::joint_fit::{BALANCE_SHARE, Dataset, fitted_tracks};
 use crate::estimation::propagation::{Stepping, propagate};
 use crate::model::hypothesis::Hypothesis;
 use crate::model::unknowns::Unknowns;
@@ -84,7 +84,9 @@ impl Dataset {
         else {
             return;
         };
-        if self.split_is_held || hypothesis.members[member].values == EffectId::Anisoelasticity.neutral() {
+        if self.holds(EffectId::Anisoelasticity)
+            || hypothesis.members[member].values == EffectId::Anisoelasticity.neutral()
+        {
             hypothesis.members[member].values[..2].copy_from_slice(&split);
         }
     }
@@ -105,21 +107,15 @@ impl Dataset {
     /// Fits with Δω held where the quadrature balance has it, and then free from there, which is kept where the fit stays with it.
     pub(super) fn with_the_split_held(&mut self, hypothesis: &Hypothesis, drive: Option<&DriveGains>) -> Fit {
         let mut hypothesis = hypothesis.clone();
-        self.split_is_held = true;
+        self.held.push(EffectId::Anisoelasticity);
         self.begin_with_the_balance(&mut hypothesis);
-        let mut held = self.fitted(&hypothesis, drive, Effort::FULL);
-        for _ in ROUNDS..MOST_ROUNDS {
-            if held.1 {
-                break;
-            }
-            held = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
-        }
+        let held = self.fitted_anew(&hypothesis, drive);
         let weighting = self.weighting();
-        self.split_is_held = false;
-        let (freed, _) = self.fitted(&held.0.hypothesis, drive, Effort::FULL);
+        self.held.clear();
+        let (freed, _) = self.fitted(&held.hypothesis, drive, Effort::FULL);
         if self.contradicts_the_balance(&freed.hypothesis) {
             self.weigh_by(&weighting);
-            return held.0;
+            return held;
         }
         freed
     }

@@ -107,7 +107,7 @@ fn misfit(segments: &[Sampled], noise: &ColouredNoise, believed: &Normal) -> f64
     let mut normal = believed.clone();
     let parts: Vec<_> = segments.par_iter().map(|s| s.whitened(noise)).collect();
     for p in &parts {
-        normal.add(p);
+        normal.add(p, 1.0);
     }
     normal.restricted_misfit().map_or(f64::INFINITY, |m| m + parts.iter().map(|p| p.ln_variance).sum::<f64>())
 }

@@ -14,6 +14,7 @@ use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::selection::discovery::discover;
 use crate::selection::last_step::last_step;
+use crate::selection::not_found::with_what_was_not_found;
 use cvg_model::effects::EffectId;
 
 /// Identifies the instrument.
@@ -60,12 +61,13 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     }
     (options.progress)("weighing by what the noise remembers");
     let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let steps = steps.into_iter().map(|step| step.read(&dataset)).collect();
     let warnings = std::mem::take(&mut dataset.warnings);
     let drives = dataset.clipping.and_then(|_| clipping(&dataset, &fitted.fit.hypothesis)?.report());
-    let found = Found { dataset, declared_fit, fitted, covariance, steps, scale_factor, errors, drives };
+    let found = Found { dataset, declared_fit, fitted, covariance, with_hidden, steps, scale_factor, errors, drives };
     found.report(head, warnings, with_plots)
 }

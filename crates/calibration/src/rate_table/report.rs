@@ -47,6 +47,8 @@ pub(super) struct Found {
     pub(super) declared_fit: Fit,
     pub(super) fitted: Fitted,
     pub(super) covariance: DMatrix<f64>,
+    /// the same with what effects that were not found may have moved
+    pub(super) with_hidden: DMatrix<f64>,
     pub(super) steps: Vec<Step>,
     pub(super) scale_factor: Option<ScaleFactor>,
     pub(super) errors: Errors,
@@ -64,7 +66,7 @@ impl Found {
         let Self { dataset, fitted, errors, .. } = &self;
         let mut channels_left = channels(dataset, &self.declared_fit, "declared", &errors.declared_on_fit);
         channels_left.extend(channels(dataset, &fitted.fit, "discovered", &errors.on_fit));
-        let inference = Inference { dataset, fitted, covariance: &self.covariance };
+        let inference = Inference { dataset, fitted, by_fit: &self.covariance, covariance: &self.with_hidden };
         let own_ratios = self.context(&[]).own_detection_ratios();
         let detection_gain_ratio = inference.detection_ratio(&own_ratios, &mut warnings);
         let actuation_gain_ratio = inference.actuation_ratio(detection_gain_ratio, &mut warnings);

@@ -30,6 +30,9 @@ const WIDEST_ACTUATION_RATIO: f64 = 0.02;
 pub(crate) struct Inference<'a> {
     pub(crate) dataset: &'a Dataset,
     pub(crate) fitted: &'a Fitted,
+    /// of the unknowns, as the fit has it: what it takes for one another
+    pub(crate) by_fit: &'a DMatrix<f64>,
+    /// of the unknowns, with what effects that were not found may have moved
     pub(crate) covariance: &'a DMatrix<f64>,
 }
 
@@ -408,7 +411,7 @@ impl Inference<'_> {
             .filter(|(at, m)| self.identifiable(*at, m))
             .map(|(at, m)| {
                 let step = steps.iter().position(|s| s.id == m.id).map(|i| steps.remove(i));
-                let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.covariance);
+                let mut rivals = confounded_with(m.id, self.hypothesis(), &self.fitted.fit.unknowns, self.by_fit);
                 let found = step.map(|s| s.confounded_with.as_slice()).unwrap_or_default().iter().copied();
                 let at_one_amplitude = alike.amplitude && m.origin == Origin::Discovered;
                 for r in found.chain(alike_at_one_amplitude(m.id).filter(|_| at_one_amplitude)) {

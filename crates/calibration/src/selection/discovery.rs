@@ -54,14 +54,35 @@ pub(crate) fn discover(
             continue;
         }
         dataset.restore(&fitted);
-        let Some((next, all)) = all_together(dataset, &fitted, &steps)? else { break };
-        (fitted, steps) = (next, all);
+        if let Some((next, all)) = all_together(dataset, &fitted, &steps)? {
+            (fitted, steps) = (next, all);
+            continue;
+        }
+        dataset.restore(&fitted);
+        let Some((next, step)) = behind_the_anisodamping(dataset, &fitted)? else { break };
+        fitted = next;
+        steps.push(step);
     }
     dataset.restore(&fitted);
     drop_weak(dataset, &mut fitted, &mut steps)?;
     look_again(dataset, &mut fitted, &mut steps)?;
     ask_every_run(dataset, &mut fitted, &mut steps)?;
     Ok((fitted, steps))
+}
+
+/// The cause of what the angle took for anisodamping, against what the energy loop had to put in: at some rates, or in one sense, a
+/// force that goes with another command is an anisodamping to the angle, and leaves it nothing to ask for.
+fn behind_the_anisodamping(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<(Fitted, Accepted)>, Refusal> {
+    let before = Before::of(dataset, fitted);
+    let Some(held) = dataset.with_the_anisodamping_held(fitted) else { return Ok(None) };
+    let Some((next, mut step)) = best_step(dataset, &held, |origin| origin == Origin::Discovered)? else {
+        return Ok(None);
+    };
+    dataset.balance_damping(&next.fit.hypothesis);
+    let agrees = !dataset.contradicts_the_damping(&next.fit.hypothesis);
+    let explains = agrees && before.is_as_large_as(validated(dataset, &next));
+    step.states[0] = State::of(&fitted.fit);
+    Ok(explains.then_some((next, step)))
 }
 
 /// What stands without a cause is put on trial again beside all that came in after it: a cause that a larger effect hid

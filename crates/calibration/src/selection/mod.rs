@@ -4,6 +4,7 @@ pub(crate) mod candidates;
 pub(crate) mod consistency;
 pub(crate) mod discovery;
 pub(crate) mod last_step;
+pub(crate) mod not_found;
 mod one_step;
 mod pairs;
 pub(crate) mod step;

@@ -114,7 +114,7 @@ fn step(dataset: &Dataset, cause: &Candidate, [before, after]: [&Fitted; 2], gai
 }
 
 /// Every cause that the campaign could name and that no search has to place, unless it is in already.
-fn causes(dataset: &Dataset, hypothesis: &Hypothesis, fitted: &Fitted) -> Vec<Candidate> {
+pub(super) fn causes(dataset: &Dataset, hypothesis: &Hypothesis, fitted: &Fitted) -> Vec<Candidate> {
     let apart = Distinguishable::on(dataset);
     let left = on_fit(dataset, &fitted.fit);
     let placed = |c: &Candidate| {

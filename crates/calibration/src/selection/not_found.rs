@@ -1,0 +1,104 @@
+//! What effects that were not found may hide. An effect below what discovery asks for moves what it is confounded with all the same, by
+//! many deviations where the campaign hardly tells it apart: every interval has to hold that as far as the effect is likely to be there
+//! (Bayesian model averaging, Hoeting, Madigan, Raftery and Volinsky 1999, over the model at hand and each that has one effect more).
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimation::fit::{Fit, Prior, scaled_inverse};
+use crate::estimation::generalised_least_squares::linearised;
+use crate::estimation::joint_fit::{Dataset, Fitted};
+use crate::estimation::normal::Normal;
+use crate::model::hypothesis::{Origin, Unknown};
+use crate::recording::Instrument;
+use crate::selection::candidates::Candidate;
+use crate::selection::together::causes;
+use crate::selection::trial::extend;
+
+/// Adds to the covariance of a fit's unknowns what the causes that the campaign could name, and did not, may have moved them by.
+/// Where all runs are at one rate, in one sense, what they do not tell apart is said of the effects that are declared.
+pub(crate) fn with_what_was_not_found(
+    dataset: &mut Dataset,
+    fitted: &Fitted,
+    covariance: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    if dataset.instrument == Instrument::Sensor || !dataset.tracks_differ() {
+        return covariance.clone();
+    }
+    let missing = causes(dataset, &fitted.fit.hypothesis, fitted);
+    dataset.balance_damping(&fitted.fit.hypothesis);
+    let Some(models) = Models::around(dataset, fitted, &missing) else { return covariance.clone() };
+    models.others.iter().filter_map(|other| models.moved_by(other)).fold(covariance.clone(), |all, by| all + by)
+}
+
+/// One linearisation for the fitted model and for each that has one effect more.
+struct Models {
+    equations: Normal,
+    /// unknowns of the fitted model
+    own: Vec<usize>,
+    /// those of them that are held
+    held: Vec<bool>,
+    /// unknowns of each effect that was not found
+    others: Vec<Vec<usize>>,
+}
+
+impl Models {
+    fn around(dataset: &Dataset, fitted: &Fitted, missing: &[Candidate]) -> Option<Self> {
+        let all = missing.iter().fold(fitted.fit.hypothesis.clone(), |h, c| extend(&h, c, Origin::Discovered));
+        let unknowns = dataset.unknowns(&all);
+        let is_of = |c: &Candidate, u: &Unknown| matches!(u, Unknown::Effect(m, _) if all.members[*m].id == c.id);
+        let others: Vec<Vec<usize>> =
+            missing.iter().map(|c| (0..unknowns.len()).filter(|&i| is_of(c, &unknowns[i])).collect()).collect();
+        let own: Vec<usize> = (0..unknowns.len()).filter(|i| !others.iter().any(|o| o.contains(i))).collect();
+        if own.len() != fitted.fit.unknowns.len() {
+            return None;
+        }
+        let mut priors = dataset.priors(&all, fitted.drive.as_ref());
+        priors.extend(dataset.by_the_energy_loop(&all));
+        let amplitude = dataset.usual_amplitude();
+        for unknown in others.iter().flatten().map(|&i| unknowns[i]) {
+            let Unknown::Effect(member, p) = unknown else { continue };
+            if priors.iter().any(|prior| prior.unknown == unknown) {
+                continue;
+            }
+            let d = all.members[member].id.description();
+            let deviation = d.parameters[p].scale * amplitude.powi(-i32::from(d.scaling.amplitude));
+            priors.push(Prior { unknown, mean: d.parameters[p].neutral, deviation, considered: false });
+        }
+        let held = own.iter().map(|&i| Prior::considered_deviation(&priors, unknowns[i]).is_some()).collect();
+        let fit = Fit { hypothesis: all, unknowns, ..fitted.fit.clone() };
+        Some(Self { equations: linearised(&dataset.tracks, &fit, &priors)?, own, held, others })
+    }
+
+    /// The step of some unknowns and its covariance.
+    fn step(&self, of: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let inverse = scaled_inverse(&self.equations.matrix.select_rows(of).select_columns(of), 0.0)?;
+        Some((&inverse * self.equations.right.select_rows(of), inverse))
+    }
+
+    /// The mean square of what an effect that was not found moves the fitted unknowns by, times the probability that it is there: as
+    /// likely as not before the data, and within what is believed of its size.
+    fn moved_by(&self, other: &[usize]) -> Option<DMatrix<f64>> {
+        let free: Vec<usize> = self.own.iter().zip(&self.held).filter(|(_, held)| !**held).map(|(i, _)| *i).collect();
+        let both: Vec<usize> = free.iter().chain(other).copied().collect();
+        let ((alone, _), (step, covariance)) = (self.step(&free)?, self.step(&both)?);
+        let gain = |of: &[usize], step: &DVector<f64>| self.equations.right.select_rows(of).dot(step);
+        let at = free.len();
+        let value = step.rows(at, other.len());
+        let own = covariance.view((at, at), (other.len(), other.len())).into_owned();
+        let believed: f64 = other.iter().map(|&i| self.equations.believed[i]).product();
+        let ln_odds = 0.5 * (gain(&both, &step) - gain(&free, &alone)) + 0.5 * (own.determinant() * believed).ln();
+        let probability = (1.0 + (-ln_odds).exp()).recip();
+        // by how much the fitted unknowns follow a unit of the effect
+        let follow = covariance.view((0, at), (at, other.len())) * scaled_inverse(&own, 0.0)?;
+        let mean_square = (own + value * value.transpose()) * probability;
+        let moved = &follow * mean_square * follow.transpose();
+        let mut out = DMatrix::zeros(self.own.len(), self.own.len());
+        let place: Vec<usize> = (0..self.own.len()).filter(|&i| !self.held[i]).collect();
+        for (a, &i) in place.iter().enumerate() {
+            for (b, &j) in place.iter().enumerate() {
+                out[(i, j)] = moved[(a, b)];
+            }
+        }
+        out.iter().all(|v| v.is_finite()).then_some(out)
+    }
+}
