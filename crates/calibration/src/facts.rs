@@ -356,6 +356,9 @@ pub struct RunReport {
 pub struct Allan {
     /// angle random walk, deg/√h; null where the deviation has no stretch of it
     pub angle_random_walk_deg_sqrt_h: Option<Estimate>,
+    /// shortest averaging time at which it was read, s: beyond what filters and digits do to the noise; null where it is null
+    #[serde(default)]
+    pub angle_random_walk_tau_s: Option<f64>,
     /// bias instability, deg/h: the lowest deviation over √(2 ln 2/π)
     pub bias_instability_dph: Estimate,
     /// averaging time at which the deviation is lowest, s

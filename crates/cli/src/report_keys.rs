@@ -55,6 +55,7 @@ const NUMBERS: &[&str] = &[
     "scale_factor.asymmetry_ppm~",
     "misalignment.*.angle_deg~",
     "allan.angle_random_walk_deg_sqrt_h~",
+    "allan.angle_random_walk_tau_s",
     "allan.bias_instability_dph~",
     "allan.bias_instability_tau_s",
     "allan.interval_s",

@@ -100,6 +100,37 @@ fn the_walk_of_recorded_rates_is_that_of_their_sum() {
     assert!(low < 1.02 * WALK && WALK < 1.02 * high && (walk / WALK - 1.0).abs() < 0.03, "{walk} [{low} {high}]");
 }
 
+/// White noise of a rate, a walk of 6 deg/√h in so many rows of 10 ms, that went through a low-pass of first order.
+fn low_passed(rows: u64, corner_hz: f64, seed: u64) -> String {
+    let share = 1.0 - (-std::f64::consts::TAU * corner_hz * 0.01).exp();
+    let (mut rate, mut theta) = (0.0, 20.0);
+    let mut text = String::from("t_s,theta_deg\n");
+    for i in 0..rows {
+        rate += share * (6.0 / 60.0 / 0.01f64.sqrt() * normal(i, seed) - rate);
+        theta += 0.01 * rate;
+        let _ = writeln!(text, "{:.2},{theta}", i as f64 * 0.01);
+    }
+    text
+}
+
+/// A filter takes from the fast noise and leaves the walk; its smooth rate, 0.1 deg/s and more, is no motion.
+#[test]
+fn the_walk_of_filtered_noise_is_read_beyond_the_filter_and_the_filter_moves_nothing() {
+    for (corner_hz, rows, beyond_s) in [(20.0, 20_000, 0.03), (5.0, 20_000, 0.12), (1.0, 60_000, 0.6)] {
+        let folder = TempDir::new().unwrap();
+        let r = report(&static_campaign(folder.path(), &[("rest.csv", low_passed(rows, corner_hz, 7))]));
+        let [walk, low, high] = estimate(&r["allan"]["angle_random_walk_deg_sqrt_h"]);
+        assert!(low < 6.0 && 6.0 < high && (walk / 6.0 - 1.0).abs() < 0.1, "{corner_hz} Hz: {walk} [{low} {high}]");
+        assert!(r["allan"]["angle_random_walk_tau_s"].as_f64().unwrap() > beyond_s, "{}", r["allan"]);
+        assert!(!r["warnings"].to_string().contains("moves"), "{}", r["warnings"]);
+    }
+    // a quarter of a minute does not tell one beyond 0.8 s of memory, and says so
+    let folder = TempDir::new().unwrap();
+    let r = report(&static_campaign(folder.path(), &[("rest.csv", low_passed(1500, 0.2, 7))]));
+    assert!(r["allan"]["angle_random_walk_deg_sqrt_h"].is_null(), "{}", r["allan"]);
+    assert!(r["warnings"].to_string().contains("angle_random_walk_deg_sqrt_h is null"), "{}", r["warnings"]);
+}
+
 #[test]
 fn an_angle_at_rest_with_too_few_digits_tells_no_walk_and_says_so() {
     let r = walk_of(|_, angle| (10.0 * angle).round() / 10.0, "theta_deg", "");

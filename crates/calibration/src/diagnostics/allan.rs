@@ -7,8 +7,6 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::numerics::linear::NormalEquations;
-
 /// Averaging times a decade.
 const TIMES_A_DECADE: f64 = 8.0;
 /// Share of the longest stretch that the longest averaging time takes: beyond it, too few differences are independent.
@@ -19,8 +17,6 @@ const SHORTEST: usize = 9;
 const INTERVAL: [f64; 2] = [0.975, 0.025];
 /// σ of flicker noise is flat at this many times the bias instability B: √(2 ln 2/π).
 pub const FLICKER: f64 = 0.664_283_115_0;
-/// Rounds of the fit's reweighting.
-const ROUNDS: usize = 8;
 
 /// σ at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,69 +82,6 @@ fn degrees_of_freedom(n: f64, m: f64) -> f64 {
 fn interval(variance: f64, freedom: f64) -> [f64; 2] {
     let Ok(chi) = ChiSquared::new(freedom) else { return [f64::NAN; 2] };
     INTERVAL.map(|p| (variance * freedom / chi.inverse_cdf(p)).sqrt())
-}
-
-/// What white noise of the rate makes of the angle, with its deviation: σ² = N²/τ, told apart from noise of the angle,
-/// 3Q²/τ², flicker and a random walk of the rate, K²τ/3, by a fit without negative variances at averaging times a factor
-/// of two apart. In the unit of the angle per √s; none where fewer than three times are there or the data has none of it.
-#[must_use]
-pub fn random_walk(octaves: &[Point]) -> Option<(f64, f64)> {
-    if octaves.len() < 3 {
-        return None;
-    }
-    let least = |terms: &[usize]| fitted(octaves, terms);
-    let subsets = (1..16usize).map(|bits| (0..4).filter(|i| bits >> i & 1 == 1).collect::<Vec<_>>());
-    let candidates = subsets.filter(|terms| terms.len() <= octaves.len()).filter_map(|terms| {
-        let (values, spread, cost) = least(&terms)?;
-        values.iter().all(|v| *v > 0.0).then_some((terms, values, spread, cost))
-    });
-    let (terms, values, spread, _) = candidates.min_by(|a, b| a.3.total_cmp(&b.3))?;
-    let at = terms.iter().position(|t| *t == 1)?;
-    let n = values[at].sqrt();
-    Some((n, spread[at] / (2.0 * n)))
-}
-
-/// Variances of these terms, their standard deviations and what the fit leaves. Points are weighed by what the model says
-/// of them and by their degrees of freedom.
-fn fitted(points: &[Point], terms: &[usize]) -> Option<(Vec<f64>, Vec<f64>, f64)> {
-    let basis = |tau: f64, term: usize| match term {
-        0 => 3.0 / (tau * tau),
-        1 => 1.0 / tau,
-        2 => 1.0,
-        _ => tau / 3.0,
-    };
-    let mut model: Vec<f64> = points.iter().map(|p| p.deviation.powi(2)).collect();
-    let (mut values, mut weighted) = (Vec::new(), Vec::new());
-    for _ in 0..ROUNDS {
-        weighted = points
-            .iter()
-            .zip(&model)
-            .map(|(p, m)| {
-                let weight = (0.5 * p.freedom).sqrt() / m.max(f64::MIN_POSITIVE);
-                (terms.iter().map(|t| basis(p.tau_s, *t) * weight).collect::<Vec<f64>>(), p.deviation.powi(2) * weight)
-            })
-            .collect();
-        let mut equations = NormalEquations::new(terms.len());
-        for (row, value) in &weighted {
-            equations.add(row, *value);
-        }
-        values = equations.solve();
-        let next: Vec<f64> = points
-            .iter()
-            .map(|p| terms.iter().zip(&values).map(|(t, v)| v * basis(p.tau_s, *t)).sum::<f64>())
-            .collect();
-        if next.iter().any(|m| !(m.is_finite() && *m > 0.0)) {
-            return None;
-        }
-        model = next;
-    }
-    let size = terms.len();
-    let normal = nalgebra::DMatrix::from_fn(size, size, |i, j| weighted.iter().map(|(r, _)| r[i] * r[j]).sum::<f64>());
-    let covariance = normal.try_inverse()?;
-    // −2 ln likelihood of the sample variances, chi-squared about the model
-    let cost = points.iter().zip(&model).map(|(p, m)| p.freedom * (m.ln() + p.deviation.powi(2) / m)).sum::<f64>();
-    let spread = (0..size).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect();
-    Some((values, spread, cost))
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use cvg_model::Envelope;
 use rayon::prelude::*;
 
 use crate::diagnostics::allan::{self, FLICKER, Point};
+use crate::diagnostics::angle_random_walk::{Unread, angle_random_walk};
 use crate::error::Refusal;
 use crate::facts::{Allan, AllanPoint, Estimate};
 use crate::numerics::angles::wrapped;
@@ -38,6 +39,11 @@ const FEWEST_INTERVALS: usize = 64;
 const DEVIATIONS: f64 = 4.0;
 /// A rate that goes on and changes by so much, deg/s, is not told from a bias that does.
 const SLOWEST_DPS: f64 = 0.05;
+/// Octaves beyond the longest interval at which a rate goes on: what the filter of the noise makes of it is over from the
+/// first on (a first-order one has τσ² at 0.8 of its end there), and a run of so many of the last tells it within this factor.
+const BEYOND: [usize; 2] = [3, 5];
+const FEWEST_LENGTHS: usize = 4;
+const ALIKE: f64 = 3.0;
 /// No bias is as large as this, deg/s.
 const LARGEST_DPS: f64 = 20.0;
 
@@ -97,11 +103,7 @@ pub(crate) fn allan(
     }
     let interval_s = longest.interval_s;
     let points = allan::overlapping(&stretches, interval_s, &allan::multiples(&stretches));
-    let octaves: Vec<usize> = std::iter::successors(Some(1usize), |m| Some(2 * m))
-        .take_while(|m| points.last().is_some_and(|p| *m as f64 * interval_s <= p.tau_s))
-        .collect();
-    let walk = allan::random_walk(&allan::overlapping(&stretches, interval_s, &octaves))
-        .filter(|_| !drifts && digit.is_none());
+    let walk = if drifts || digit.is_some() { Err(Unread::NoModel) } else { angle_random_walk(&stretches, interval_s) };
     let (bottom, at_the_end) = bottom(&points).ok_or_else(|| {
         Refusal::no_answer(&longest.name, "the angle at rest does not change at all", "an angle with all its digits")
     })?;
@@ -117,17 +119,17 @@ pub(crate) fn allan(
             "the angle at rest goes in steps of {digit:.2e}° and mostly repeats the row before: its noise is below its last digit, \
              so that angle_random_walk_deg_sqrt_h is null, and bias_instability_dph is what it is at most; wanted: more digits"
         ));
-    } else if walk.is_none() && !drifts {
-        warnings.push(
-            "angle_random_walk_deg_sqrt_h is null: no stretch of the Allan deviation falls as 1/√τ; a rate in the place of \
-             theta_deg looks like that: of one the angle is theta_deg = \"integral(COLUMN)\" in [columns]"
-                .into(),
-        );
+    } else if let Some(why) = walk.err().filter(|_| !drifts) {
+        warnings.push(format!("angle_random_walk_deg_sqrt_h is null: {}", unread(why)));
     }
     let hour = 3600.0;
     let dph = |v: f64| v * hour;
     let allan = Allan {
-        angle_random_walk_deg_sqrt_h: walk.map(|(n, d)| Estimate::new(n * hour.sqrt(), d * hour.sqrt())),
+        angle_random_walk_deg_sqrt_h: walk.ok().map(|read| Estimate {
+            value: read.value.value * hour.sqrt(),
+            ci95: read.value.ci95.map(|end| end * hour.sqrt()),
+        }),
+        angle_random_walk_tau_s: walk.ok().map(|read| read.from_s),
         bias_instability_dph: Estimate {
             value: dph(bottom.deviation / FLICKER),
             ci95: bottom.ci95.map(|v| dph(v / FLICKER)),
@@ -142,6 +144,20 @@ pub(crate) fn allan(
     let wander = points.last().map_or(0.0, |p| p.deviation);
     let rates = rests.iter().map(|r| Estimate::new(r.rate_dps, wander)).collect();
     Ok((allan, rates, warnings))
+}
+
+/// Why there is no angle random walk, in words.
+fn unread(why: Unread) -> &'static str {
+    match why {
+        Unread::NoneOfIt => {
+            "no stretch of the Allan deviation falls as 1/√τ by more than it is uncertain, as where a filter remembers for much of the run: \
+             a longer one tells; or as of a rate in the place of theta_deg: of one the angle is theta_deg = \"integral(COLUMN)\" in [columns]"
+        }
+        Unread::NoModel => {
+            "from no averaging time on is the Allan deviation one of white noise, flicker and a random walk of the rate, or too \
+             little of it is; a longer run would tell, of a filtered rate one of several hundred times what the filter remembers"
+        }
+    }
 }
 
 /// The lowest point, and whether the deviation still falls there.
@@ -207,10 +223,15 @@ impl AtRest {
                 wanted,
             ));
         }
-        let rates = std::iter::successors(Some(1usize), |m| Some(2 * m))
+        let rates: Vec<(usize, f64)> = std::iter::successors(Some(1usize), |m| Some(2 * m))
             .take_while(|m| *m == 1 || *m as f64 * self.interval_s <= LOOKED_AT_S)
-            .filter_map(|m| self.rate_that_goes_on(m));
-        let Some(rate) = rates.max_by(f64::total_cmp).filter(|r| *r > SLOWEST_DPS) else { return Ok(None) };
+            .filter_map(|m| Some((m, self.rate_that_goes_on(m)?)))
+            .collect();
+        let longest = rates.iter().map(|(m, _)| *m).max();
+        let fastest = rates.iter().map(|(_, rate)| *rate).max_by(f64::total_cmp).filter(|rate| *rate > SLOWEST_DPS);
+        let Some(rate) = fastest.filter(|_| !longest.is_some_and(|m| self.forgets_its_rate(m))) else {
+            return Ok(None);
+        };
         let what = format!("the instrument moves throughout: its rate goes on and changes by {rate:.2} deg/s rms");
         if rate > FASTEST_DPS {
             return Err(Refusal::no_answer(&self.name, what, wanted));
@@ -241,6 +262,24 @@ impl AtRest {
         let pairs = || rates.iter().flat_map(|r| r.windows(2));
         let product = pairs().map(|w| kept(w[0]) * kept(w[1])).sum::<f64>() / pairs().count().max(1) as f64;
         (product > GOES_ON * square).then(|| square.sqrt())
+    }
+
+    /// The angle wanders as of white noise at averaging times well beyond this many samples, over which the rate still goes on:
+    /// that is noise that was filtered. What sways returns, and there τσ²(τ) falls with τ; what drifts goes on, and it grows.
+    fn forgets_its_rate(&self, samples: usize) -> bool {
+        let octaves: Vec<usize> = (0..=BEYOND[1]).map(|octave| samples << octave).collect();
+        let wander: Vec<f64> = allan::overlapping(&self.stretches, self.interval_s, &octaves)
+            .iter()
+            .map(|point| point.tau_s * point.deviation.powi(2))
+            .collect();
+        let longest = self.stretches.iter().map(Vec::len).max().unwrap_or(0);
+        if wander.len() < octaves.len() || longest < FEWEST_LENGTHS * octaves[BEYOND[1]] {
+            return false;
+        }
+        let (below, beyond) = wander.split_at(BEYOND[0]);
+        let least = beyond.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        most(beyond) < ALIKE * least && most(below) < ALIKE * least
     }
 
     /// The step of an angle that mostly repeats the row before; none where it does not.

@@ -1,6 +1,7 @@
 //! What a fit leaves: its size on held-out data, its harmonics and lines, and the figures that show it.
 
 pub mod allan;
+pub(crate) mod angle_random_walk;
 pub(crate) mod at_rest;
 pub(crate) mod covariance;
 pub(crate) mod decomposition;
