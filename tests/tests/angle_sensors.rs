@@ -5,7 +5,7 @@
 use cvg_calibration::recording::{Campaign, Recording, Reference, Role, Run};
 use cvg_calibration::report::Status;
 use cvg_calibration::{Options, compensate, identify};
-use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, lines, run, sensor};
+use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, lines, read_at, run, sensor};
 
 /// A turn of 370° there and back at `rate` deg/s but for ramps of `ramp` seconds, 100 samples/s: time, angle of the table in
 /// deg, rate in deg/s.
@@ -174,6 +174,30 @@ fn pole_pairs_off_centre_show_once_a_turn_of_the_shaft() {
         assert!(said.suggestion.contains("eccentric"), "{said:?}");
         // slow noise is none, and within one turn it could be a drift
         assert!(lines(&poles(3.0, 0.0, 0.98)).is_empty() && lines(&poles(1.2, 0.5, 0.0)).is_empty(), "seed {seed}");
+    }
+}
+
+/// pole_pairs is a count, and has no sense: with it or without, k is positive where the angle goes against the reference (Equation 1).
+/// The sign of angular_gain is one, and is kept.
+#[test]
+fn the_sign_of_the_angular_gain_is_that_of_the_data_where_the_campaign_states_a_number_of_pole_pairs() {
+    let table: Vec<f64> = (0..3000).map(|i| 0.6 * f64::from(i)).collect();
+    for counts in [1.0, -1.0] {
+        let gain = |pole_pairs, angular_gain| {
+            let electrical: Vec<f64> = table.iter().map(|a| 4.0 * counts * a).collect();
+            let (x, y) = channels(&electrical, 1.0, 0.0, 1e-3, 5);
+            let runs = vec![read_at(table.clone(), x, y, Role::Fit)];
+            let i = identified(Campaign { pole_pairs, angular_gain, ..sensor(runs) });
+            let sense = i.calibration.hypothesis.sense() * i.report.angular_gain.value;
+            assert!((sense - 4.0 * counts).abs() < 1e-9, "{sense} for {counts}, {pole_pairs:?}, {angular_gain:?}");
+            let told = i.report.runs[0].angular_gain.unwrap();
+            assert!((told.value / i.report.angular_gain.value - 1.0).abs() < 1e-3, "{told:?}");
+            i.report.angular_gain.value
+        };
+        assert_eq!([gain(Some(4.0), None), gain(None, None)], [-4.0 * counts; 2]);
+        for stated in [1.0, -1.0] {
+            assert_eq!([gain(Some(4.0), Some(stated)), gain(None, Some(4.0 * stated))], [4.0 * stated; 2]);
+        }
     }
 }
 

@@ -86,10 +86,10 @@ pub(crate) struct Described<'a> {
 }
 
 impl Described<'_> {
-    /// k, in the sign that the campaign states.
-    pub(crate) fn angular_gain(&self, stated: Option<f64>) -> Estimate {
+    /// k, in the sign that the campaign states, or else of Equation 1: positive against the reference.
+    pub(crate) fn angular_gain(&self, sense: Option<f64>) -> Estimate {
         let (gain, deviation) = self.signed_gain();
-        let sign = if stated.map_or(-gain, |s| s).is_sign_negative() { -1.0 } else { 1.0 };
+        let sign = if sense.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
         let value = sign * gain.abs();
         Estimate { value, ci95: [value - STUDENT_19 * deviation, value + STUDENT_19 * deviation] }
     }
@@ -218,9 +218,9 @@ impl Described<'_> {
 
     /// What a compensation undoes: readout, following of motion, table. Lines belong to the reference and not to the
     /// sensor, and are left out.
-    pub(crate) fn hypothesis(&self, stated: Option<f64>) -> Hypothesis {
+    pub(crate) fn hypothesis(&self, sense: Option<f64>) -> Hypothesis {
         let m = self.model;
-        let gain = self.angular_gain(stated).value;
+        let gain = self.angular_gain(sense).value;
         let mut h = Hypothesis::ideal(Instrument::Sensor, m.sensor.period, gain);
         // Equation 1 counts against the input
         h.follows_input = gain * self.signed_gain().0 > 0.0;

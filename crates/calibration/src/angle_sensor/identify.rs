@@ -85,11 +85,9 @@ pub(crate) fn identify(
     let rate_gyroscope = is_rate_gyroscope(&campaign);
     require_an_angle(&campaign)?;
     let instrument = campaign.instrument;
-    let stated = match campaign.pole_pairs {
-        Some(pairs) => Some(pairs.copysign(campaign.angular_gain.unwrap_or(1.0))),
-        None => campaign.angular_gain,
-    };
+    // a number of periods has no sense: the sign of angular_gain states it, and the data where there is none
     let sense = campaign.angular_gain.map(f64::signum);
+    let stated = campaign.pole_pairs.or(campaign.angular_gain);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let scattered = if stated.is_none() && !rate_gyroscope { in_any_order(&campaign.runs, period) } else { None };
     let stated = stated.or(scattered);
@@ -146,7 +144,7 @@ pub(crate) fn identify(
     (options.progress)("choosing a model of the sensor");
     let (texts, why_not) = competing(&options.effects, &fitted);
     let mut finding = if rate_gyroscope {
-        rate_finding(stated, period, &fitted, &held)?
+        rate_finding(stated, sense, period, &fitted, &held)?
     } else {
         let all: Vec<usize> = fitted.iter().map(|run| run.number).collect();
         let asked_for = positions(&held);
@@ -305,9 +303,9 @@ fn identified(
 /// What a campaign says of its sensor.
 #[derive(Clone, Copy)]
 struct Asked {
-    /// its angular gain
+    /// the size of its angular gain
     stated: Option<f64>,
-    /// the sign of that
+    /// the sign of its angular gain
     sense: Option<f64>,
     /// period of its angle, rad
     period: f64,
@@ -359,7 +357,7 @@ fn sensor_finding(
     warnings.extend(thermal.and_then(Thermal::said));
     let recorded: Vec<SensorRun> = thinned.iter().map(SensorRun::as_recorded).collect();
     let samples = model.sensor.samples(&recorded, declared.as_ref());
-    let mut hypothesis = described.hypothesis(stated);
+    let mut hypothesis = described.hypothesis(sense);
     let neutral_hypothesis = Hypothesis { members: Vec::new(), angle_table: None, clip: None, ..hypothesis.clone() };
     if let Some(thermal) = thermal {
         hypothesis.reference_c = Some(thermal.reference_c());
@@ -373,7 +371,7 @@ fn sensor_finding(
             let unit = runs.iter().find_map(of_the_angle).map_or(String::new(), |unit| format!("; wanted: {unit}"));
             format!("nothing that was found predicts rows that were not fitted better than the sensor as it is{unit}")
         }),
-        angular_gain: described.angular_gain(stated),
+        angular_gain: described.angular_gain(sense),
         detection_gain_ratio: gain_ratio,
         effects: with_the_interval(described.effects(), all)
             .into_iter()

@@ -30,6 +30,7 @@ const ENOUGH_ROWS_OF_A_RUN: usize = 10_000;
 /// Where the runs are too short, or turn at one rate.
 pub(super) fn rate_finding(
     stated: Option<f64>,
+    sense: Option<f64>,
     period: f64,
     runs: &[SensorRun],
     held: &[SensorRun],
@@ -42,7 +43,7 @@ pub(super) fn rate_finding(
     let (model, by_nonlinearity) = beside_nonlinearity(&applied, stated, period, runs);
     let scale_factor = by_nonlinearity.as_ref().map(|n| n.found);
     let (gain, deviation) = model.gain;
-    let sign = if stated.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
+    let sign = if sense.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
     let applied_gain = sign * applied.gain.0.abs();
     let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
