@@ -47,6 +47,34 @@ fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed
     }
 }
 
+/// A scale factor that goes with the square of the rate, by 1798 ppm from the slowest to the fastest, in steady runs and in a staircase; what
+/// is told holds it, and what each run tells holds what was planted there.
+#[test]
+fn a_scale_factor_that_goes_with_the_square_of_the_rate_is_told_as_it_is() {
+    let (slow, fast) = (10.0, 300.0);
+    let of = |rate: f64| 1.0 + 1798e-6 * (rate * rate - slow * slow) / (fast * fast - slow * slow);
+    // over the mean of the two
+    let planted = 1e6 * (of(fast) - of(slow)) / (0.5 * (of(fast) + of(slow)));
+    let speeds = [slow, 50.0, 100.0, 150.0, 200.0, fast];
+    let both_ways: Vec<f64> = speeds.iter().flat_map(|speed| [*speed, -speed]).collect();
+    // the last quarter of the staircase is held out
+    let stairs = [both_ways.as_slice(), &[75.0, -75.0, 125.0, -125.0]].concat();
+    for seed in 0..2 {
+        let steady =
+            both_ways.iter().enumerate().map(|(n, rate)| steady(*rate, of(*rate), 50 * seed + n as u64)).collect();
+        for (name, runs) in [("steady", steady), ("staircase", vec![staircase(&stairs, of, seed)])] {
+            let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
+            let report = identified(campaign).report;
+            let told = report.scale_factor.unwrap().nonlinearity_ppm;
+            println!("{name}, {seed}: {told:?}");
+            assert!(holds(&told, planted) && told.half_width() < 0.1 * planted, "{name}, {seed}: {told:?}");
+            for (r, rate) in report.runs.iter().zip(&both_ways).filter(|_| name == "steady") {
+                assert!(holds(&r.angular_gain.unwrap(), -of(*rate)), "{seed}, {}: {:?}", r.file, r.angular_gain);
+            }
+        }
+    }
+}
+
 /// What is told is said not to be in the calibration.
 fn is_not_undone(warning: &str) -> bool {
     warning.starts_with("the scale factor goes with the rate, which a calibration does not undo")

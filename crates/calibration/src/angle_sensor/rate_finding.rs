@@ -41,7 +41,7 @@ pub(super) fn rate_finding(
     })?;
     let thinned = thinned(runs);
     let (model, by_nonlinearity) = beside_nonlinearity(&applied, stated, period, runs);
-    let scale_factor = by_nonlinearity.as_ref().map(|n| n.found);
+    let scale_factor = by_nonlinearity.as_ref().map(Nonlinearity::found);
     let (gain, deviation) = model.gain;
     let sign = if sense.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
@@ -99,7 +99,7 @@ pub(super) fn rate_finding(
             // at one rate what goes with the rate is part of what the run tells
             let turns_at_several =
                 move |run: &SensorRun| Stretch::new(run, 0, &sensor, 0.0).is_some_and(|s| tell_scale(&[s]));
-            let linear = move |run: &SensorRun| match told.filter(|_| turns_at_several(run)) {
+            let linear = move |run: &SensorRun| match told.as_ref().filter(|_| turns_at_several(run)) {
                 Some(told) => told.taken_out(run),
                 None => run.clone(),
             };
@@ -131,7 +131,7 @@ fn beside_nonlinearity(
         if !last.is_told() {
             break;
         }
-        let last = *last;
+        let last = last.clone();
         let linear: Vec<SensorRun> = runs.iter().map(|run| last.taken_out(run)).collect();
         let Some(mut beside) = RateGyroscope::identify(stated, period, &linear) else { break };
         let Some(again) = Nonlinearity::of_the_gains(&beside, &enough).filter(Nonlinearity::is_told) else {

@@ -5,7 +5,7 @@ use super::rate_alone::{SAME_SPEED, found};
 use super::rate_gyroscope::{RateGyroscope, tell_scale};
 use super::rate_regression::{Stretch, Term};
 use super::samples::{Reading, SensorRun};
-use crate::diagnostics::scale_factor::scale_factor;
+use crate::diagnostics::gain_over_rate::GainOverRate;
 use crate::facts::ScaleFactor;
 use crate::report::Estimate;
 
@@ -17,54 +17,50 @@ const FEWEST_BLOCKS: usize = 10;
 const SAME_RATE: f64 = 2e-3;
 
 /// A scale factor that goes with the rate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Nonlinearity {
-    pub(super) found: ScaleFactor,
+    over_rate: GainOverRate,
     /// mean scale factor
     gain: f64,
-    /// slowest and fastest of the speeds at which it was found, rad/s
-    speeds: [f64; 2],
 }
 
 impl Nonlinearity {
     /// From what runs at one rate, and steps of others, tell beside what was fitted to all; none where they do not.
     pub(super) fn of_the_gains(model: &RateGyroscope, runs: &[SensorRun]) -> Option<Self> {
         let gains = if model.answered { model.gains(runs) } else { Vec::new() };
-        let found = scale_factor(&gains, model.deviation(Term::Bias).to_degrees())?;
-        let speeds = gains.iter().map(|(rate, _)| rate.abs().to_radians());
-        let ends = |[low, high]: [f64; 2], speed: f64| [low.min(speed), high.max(speed)];
-        Some(Self { found, gain: model.gain.0, speeds: speeds.fold([f64::INFINITY, 0.0], ends) })
+        let over_rate = GainOverRate::told(&gains, model.deviation(Term::Bias).to_degrees())?;
+        Some(Self { over_rate, gain: model.gain.0 })
+    }
+
+    pub(super) fn found(&self) -> ScaleFactor {
+        self.over_rate.found
     }
 
     /// Either part is told from nothing.
     pub(super) fn is_told(&self) -> bool {
-        [self.found.nonlinearity_ppm, self.found.asymmetry_ppm].iter().any(|e| e.value.abs() > e.half_width())
+        [self.found().nonlinearity_ppm, self.found().asymmetry_ppm].iter().any(|e| e.value.abs() > e.half_width())
     }
 
     /// Whether it is this one, to a tenth of its intervals.
     pub(super) fn is(&self, other: &Self) -> bool {
         let alike = |a: Estimate, b: Estimate| (a.value - b.value).abs() < 0.1 * a.half_width();
-        alike(self.found.nonlinearity_ppm, other.found.nonlinearity_ppm)
-            && alike(self.found.asymmetry_ppm, other.found.asymmetry_ppm)
+        alike(self.found().nonlinearity_ppm, other.found().nonlinearity_ppm)
+            && alike(self.found().asymmetry_ppm, other.found().asymmetry_ppm)
     }
 
     /// By what share of itself it is uncertain, as a half width: that of the part that is told better.
     pub(super) fn uncertainty(&self) -> f64 {
         let share = |e: Estimate| e.half_width() / e.value.abs().max(f64::MIN_POSITIVE);
-        share(self.found.nonlinearity_ppm).min(share(self.found.asymmetry_ppm))
+        share(self.found().nonlinearity_ppm).min(share(self.found().asymmetry_ppm))
     }
 
     /// What it adds to the angle in the course of a run, rad.
     pub(super) fn of(&self, run: &SensorRun) -> Vec<f64> {
-        let [slow, fast] = self.speeds;
-        let share = |rate: f64| {
-            let by_speed = self.found.nonlinearity_ppm.value * (rate.abs() - 0.5 * (slow + fast)) / (fast - slow);
-            1e-6 * (by_speed + 0.5 * self.found.asymmetry_ppm.value * rate.signum())
-        };
         let turns = run.reference_rad.windows(2).zip(run.t_s.windows(2));
         let steps = turns.map(|(a, t)| {
             let turned = a[1] - a[0];
-            self.gain * share(turned / (t[1] - t[0]).max(f64::MIN_POSITIVE)) * turned
+            let rate = turned / (t[1] - t[0]).max(f64::MIN_POSITIVE);
+            self.gain * self.over_rate.share(rate.to_degrees()) * turned
         });
         let sums = steps.scan(0.0, |sum, step| {
             *sum += step;

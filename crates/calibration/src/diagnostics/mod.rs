@@ -7,6 +7,7 @@ pub(crate) mod covariance;
 pub(crate) mod decomposition;
 pub(crate) mod drives;
 pub(crate) mod evaluate;
+pub(crate) mod gain_over_rate;
 pub(crate) mod influences;
 pub mod plots;
 pub(crate) mod residual;

@@ -1,13 +1,9 @@
-//! How the scale factor goes with the input rate: the slope of each run's angle over its input, over its rate.
-//!
-//! $$k_i = k + c \frac{|Ω_i|}{Ω_{max}} + a\\,\mathrm{sgn}\\,Ω_i + \frac{b}{Ω_i}$$
-//!
-//! A bias b that all runs share looks like a gain at a steady rate; nothing is known of it but that it is of the order of
-//! the Earth's rate.
+//! How the scale factor of a whole-angle gyroscope goes with the input rate: the slope of each run's angle over its input, over its rate.
 
-use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostics::covariance::of_blocks;
+use crate::diagnostics::gain_over_rate::{GainOverRate, range_of_rates};
 use crate::estimation::fit::{Effort, Fit, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::propagation::Start;
@@ -17,15 +13,6 @@ use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::robust_deviation;
 use crate::recording::Role;
-
-/// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
-const BIAS_DPS: f64 = 0.004_2;
-/// What the other unknowns are believed to be, as shares of the gain: nothing.
-const VAGUE: f64 = 10.0;
-/// Rates that differ by less than this share of the largest are one rate.
-const SAME_RATE: f64 = 0.02;
-/// Rates that have to be there: with as many as there are unknowns a run that is off by itself shows.
-const FEWEST_RATES: usize = 4;
 
 /// Blocks of the jackknife, and Student's 97.5 % point for one fewer degrees of freedom.
 const BLOCKS: usize = 10;
@@ -44,8 +31,8 @@ const UNKNOWNS: usize = 5;
 pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<ScaleFactor> {
     range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees()))?;
     let (free, covariance) = with_drifts(dataset, fitted);
-    let of = |h: &Hypothesis| scale_factor(&gains(dataset, h, &free.starts), 0.0);
-    let nominal = of(&free.hypothesis)?;
+    let told = GainOverRate::told(&gains(dataset, &free.hypothesis, &free.starts), 0.0)?;
+    let nominal = told.found;
     let deviations: DVector<f64> = covariance.diagonal().map(|v| v.max(0.0).sqrt());
     let correlation = DMatrix::from_fn(deviations.len(), deviations.len(), |i, j| {
         let scale = deviations[i] * deviations[j];
@@ -58,7 +45,7 @@ pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<
         for (i, unknown) in free.unknowns.iter().enumerate().filter(|(_, u)| **u != Unknown::AngularGain) {
             moved.set(*unknown, moved.get(*unknown) + value.max(0.0).sqrt() * deviations[i] * axis[i]);
         }
-        let Some(other) = of(&moved) else { continue };
+        let Some(other) = told.again(&gains(dataset, &moved, &free.starts), 0.0) else { continue };
         squares[0] += (other.nonlinearity_ppm.value - nominal.nonlinearity_ppm.value).powi(2);
         squares[1] += (other.asymmetry_ppm.value - nominal.asymmetry_ppm.value).powi(2);
     }
@@ -141,85 +128,4 @@ fn slope(segments: &[Residual]) -> Option<(f64, f64)> {
     let spread: f64 = without.iter().map(|w| (w - mean).powi(2)).sum();
     let deviation = ((BLOCKS - 1) as f64 / BLOCKS as f64 * spread).sqrt();
     (value.is_finite() && deviation.is_finite()).then_some((value, deviation))
-}
-
-/// Nonlinearity and asymmetry from rates and gains, where four rates or more and both senses are there.
-/// `bias_dps` is what a bias common to all runs is believed to be, standard deviation, deg/s; no less than the Earth's rate.
-pub(crate) fn scale_factor(gains: &[(f64, Estimate)], bias_dps: f64) -> Option<ScaleFactor> {
-    let told: Vec<(f64, Estimate)> =
-        gains.iter().copied().filter(|(rate, gain)| rate.abs() > 0.0 && gain.half_width() > 0.0).collect();
-    let [slowest, fastest] = range_of_rates(told.iter().map(|t| t.0))?;
-    let range = 1.0 - slowest / fastest;
-    let mean = told.iter().map(|t| t.1.value).sum::<f64>() / told.len() as f64;
-    let prior = [VAGUE, VAGUE, VAGUE, bias_dps.max(BIAS_DPS)].map(|s| (s * mean).powi(-2));
-    let mut information = Matrix4::from_diagonal(&Vector4::from(prior));
-    let mut right = Vector4::zeros();
-    let row = |rate: f64| Vector4::new(1.0, rate.abs() / fastest, rate.signum(), 1.0 / rate);
-    for (rate, gain) in &told {
-        let (row, weight) = (row(*rate), (1.96 / gain.half_width()).powi(2));
-        information += weight * row * row.transpose();
-        right += weight * (gain.value - mean) * row;
-    }
-    let covariance = information.try_inverse()?;
-    let x = covariance * right;
-    // runs that scatter by more than they say widen all intervals
-    let left: f64 = told
-        .iter()
-        .map(|(rate, gain)| ((gain.value - mean - row(*rate).dot(&x)) * 1.96 / gain.half_width()).powi(2))
-        .sum();
-    let spare = told.len().saturating_sub(4);
-    let wider = if spare > 0 { (left / spare as f64).max(1.0).sqrt() } else { 1.0 };
-    let ppm = 1e6 / (mean + x[0] + 0.5 * (1.0 + slowest / fastest) * x[1]);
-    let estimate = |i: usize, scale: f64| {
-        Estimate::new(ppm * scale * x[i], (ppm * scale * wider * covariance[(i, i)].max(0.0).sqrt()).abs())
-    };
-    Some(ScaleFactor { nonlinearity_ppm: estimate(1, range), asymmetry_ppm: estimate(2, 2.0) })
-}
-
-/// The slowest and the fastest rate, where there are four or more, in both senses, that are not one.
-fn range_of_rates(rates: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    let mut rates: Vec<f64> = rates.filter(|rate| rate.abs() > 0.0).collect();
-    rates.sort_by(f64::total_cmp);
-    let both = rates.first()? * rates.last()? < 0.0;
-    let fastest = rates.iter().map(|r| r.abs()).fold(0.0, f64::max);
-    let slowest = rates.iter().map(|r| r.abs()).fold(f64::INFINITY, f64::min);
-    rates.dedup_by(|a, b| (*a - *b).abs() < SAME_RATE * fastest);
-    (rates.len() >= FEWEST_RATES && both && 1.0 - slowest / fastest >= SAME_RATE).then_some([slowest, fastest])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn run(rate: f64, gain: f64, half_width: f64) -> (f64, Estimate) {
-        (rate, Estimate { value: gain, ci95: [gain - half_width, gain + half_width] })
-    }
-
-    #[test]
-    fn nonlinearity_asymmetry_and_bias_are_told_apart() {
-        let (k, bias) = (0.78, 0.003);
-        let runs: Vec<(f64, Estimate)> = [-500.0, -300.0, -100.0, 100.0, 300.0, 500.0]
-            .map(|rate: f64| {
-                let ppm = 200.0 * (rate.abs() - 100.0) / 400.0 + 25.0 * rate.signum();
-                run(rate, k * (1.0 + 1e-6 * ppm) + bias / rate, 1e-6)
-            })
-            .into();
-        let s = scale_factor(&runs, 0.0).expect("six rates");
-        assert!((s.nonlinearity_ppm.value - 200.0).abs() < 4.0, "{s:?}");
-        assert!((s.asymmetry_ppm.value - 50.0).abs() < 4.0, "{s:?}");
-        assert!(s.nonlinearity_ppm.half_width() < 10.0, "{s:?}");
-    }
-
-    #[test]
-    fn a_bias_of_the_earths_rate_stays_open_and_three_rates_tell_nothing() {
-        let runs: Vec<(f64, Estimate)> = [-300.0, -100.0, 100.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
-        let s = scale_factor(&runs, 0.0).expect("four rates");
-        assert!(
-            s.nonlinearity_ppm.value.abs() < 1e-6 && s.nonlinearity_ppm.half_width() > 1.28,
-            "wider than noise makes it: {s:?}"
-        );
-        assert_eq!(scale_factor(&runs[1..], 0.0), None);
-        let one_way: Vec<(f64, Estimate)> = [100.0, 300.0, 500.0].map(|rate| run(rate, 0.78, 1e-6)).into();
-        assert_eq!(scale_factor(&one_way, 0.0), None);
-    }
 }
