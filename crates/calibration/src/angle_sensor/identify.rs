@@ -8,7 +8,7 @@ use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel, positions};
 use super::odd_runs::without_odd_runs;
-use super::rate_finding::rate_finding;
+use super::rate_finding::{Stated, rate_finding};
 use super::rate_runs;
 use super::readout::Kind;
 use super::report::{ByItself, Errors, Finding, Head, report};
@@ -144,7 +144,7 @@ pub(crate) fn identify(
     (options.progress)("choosing a model of the sensor");
     let (texts, why_not) = competing(&options.effects, &fitted);
     let mut finding = if rate_gyroscope {
-        rate_finding(stated, sense, period, &fitted, &held)?
+        rate_finding(Stated { gain: stated, sense, reference_c }, period, &fitted, &held)?
     } else {
         let all: Vec<usize> = fitted.iter().map(|run| run.number).collect();
         let asked_for = positions(&held);

@@ -23,6 +23,7 @@ pub(crate) mod rate_gyroscope;
 mod rate_nonlinearity;
 mod rate_regression;
 mod rate_runs;
+mod rate_thermal;
 mod readout;
 mod readout_fit;
 pub(crate) mod reference_free;

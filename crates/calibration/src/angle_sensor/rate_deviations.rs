@@ -25,7 +25,7 @@ pub(super) fn deviations(stretches: &[Stretch], terms: &[Term], values: &[f64], 
 }
 
 /// Standard deviations of estimates each made without one part (Künsch 1989).
-fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
+pub(super) fn jackknife(fits: &[Vec<f64>], unknowns: usize) -> Vec<f64> {
     let n = fits.len() as f64;
     (0..unknowns)
         .map(|i| {

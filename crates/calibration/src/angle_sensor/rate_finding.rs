@@ -3,11 +3,13 @@
 use cvg_model::effects::EffectId;
 
 use super::identify::{take_apart, thinned};
+use super::rate_alone::Alone;
 use super::rate_deviations::T_PARTS;
 use super::rate_gyroscope::{RateGyroscope, tell_scale};
 use super::rate_nonlinearity::Nonlinearity;
 use super::rate_regression::{Stretch, Term};
 use super::rate_runs;
+use super::rate_thermal::BiasOverTemperature;
 use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
 use crate::error::Refusal;
@@ -24,22 +26,47 @@ const MOST_ROUNDS: usize = 6;
 /// Rows of a run beyond which steps of its rate are looked for in every so many.
 const ENOUGH_ROWS_OF_A_RUN: usize = 10_000;
 
+/// What a campaign says of its rate gyroscope.
+#[derive(Clone, Copy)]
+pub(super) struct Stated {
+    /// the size of its scale factor
+    pub(super) gain: Option<f64>,
+    /// the sign of its angular gain
+    pub(super) sense: Option<f64>,
+    /// the temperature that parameters refer to, °C
+    pub(super) reference_c: Option<f64>,
+}
+
+/// Runs with what goes with the temperature taken out, where that is told.
+fn at_one_temperature(thermal: Option<&BiasOverTemperature>, runs: &[SensorRun]) -> Vec<SensorRun> {
+    runs.iter().map(|run| thermal.map_or_else(|| run.clone(), |told| told.taken_out(run))).collect()
+}
+
 /// Identifies a rate gyroscope from the runs to fit, and says what has to be said of it.
 ///
 /// # Errors
 /// Where the runs are too short, or turn at one rate.
 pub(super) fn rate_finding(
-    stated: Option<f64>,
-    sense: Option<f64>,
+    campaign: Stated,
     period: f64,
-    runs: &[SensorRun],
+    recorded: &[SensorRun],
     held: &[SensorRun],
 ) -> Result<Finding<'static>, Refusal> {
+    let Stated { gain: stated, sense, reference_c } = campaign;
+    let of = |runs: &[SensorRun]| {
+        RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
+            Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
+        })
+    };
+    let thermal = BiasOverTemperature::told(stated, period, recorded, reference_c);
+    let beside = of(&at_one_temperature(thermal.as_ref(), recorded))?;
+    let thermal = thermal.filter(|_| beside.answered);
     // what serves best where nothing undoes how the scale factor goes with the rate
-    let applied = RateGyroscope::identify(stated, period, runs).ok_or_else(|| {
-        Refusal::no_answer("campaign", "the runs are too short to leave parts of them out", "a longer recording")
-    })?;
-    let thinned = thinned(runs);
+    let applied = if thermal.is_some() { beside } else { of(recorded)? };
+    let runs = at_one_temperature(thermal.as_ref(), recorded);
+    let held = at_one_temperature(thermal.as_ref(), held);
+    let (runs, held) = (runs.as_slice(), held.as_slice());
+    let thinned = thinned(recorded);
     let (model, by_nonlinearity) = beside_nonlinearity(&applied, stated, period, runs);
     let scale_factor = by_nonlinearity.as_ref().map(Nonlinearity::found);
     let (gain, deviation) = model.gain;
@@ -52,6 +79,8 @@ pub(super) fn rate_finding(
     let mut hypothesis = Hypothesis {
         angular_gain: applied_gain,
         rate_bias_rad_s: applied.value(Term::Bias),
+        rate_bias_per_k_rad_s: thermal.as_ref().map_or(0.0, BiasOverTemperature::slope_rad_s_k),
+        reference_c: thermal.as_ref().map(BiasOverTemperature::reference_c),
         ..neutral_hypothesis.clone()
     };
     let latency = applied.latency_s();
@@ -75,6 +104,7 @@ pub(super) fn rate_finding(
             applied_gain.abs()
         ));
     }
+    warnings.extend(thermal.as_ref().and_then(BiasOverTemperature::said));
     let sensor = model.sensor;
     let raw = move |run: &SensorRun| sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.error).collect();
     Ok(Finding {
@@ -85,11 +115,12 @@ pub(super) fn rate_finding(
         }),
         angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
         detection_gain_ratio: None,
-        effects: rate_effects(&model),
+        effects: rate_effects(&model).into_iter().chain(thermal.as_ref().map(BiasOverTemperature::effect)).collect(),
         hypothesis,
         neutral_hypothesis,
         scale_factor,
-        bias: model.answered.then(|| model.of_all(Term::Bias)).filter(|_| !model.bias_varies),
+        // runs at other temperatures have other biases, and do not contradict it
+        bias: model.answered.then(|| model.of_all(Term::Bias)).filter(|_| !model.bias_varies && thermal.is_none()),
         decomposition: take_apart(&samples, &thinned, sensor.cycles, sensor.gain),
         warnings,
         raw: Some(Box::new(raw)),
@@ -103,10 +134,19 @@ pub(super) fn rate_finding(
                 Some(told) => told.taken_out(run),
                 None => run.clone(),
             };
-            let runs: Vec<SensorRun> = thinned.iter().map(&linear).collect();
-            Box::new(move |run| model.alone(&linear(run), &runs))
+            let thermal = thermal.clone();
+            let runs: Vec<SensorRun> = at_one_temperature(thermal.as_ref(), &thinned).iter().map(&linear).collect();
+            Box::new(move |run| {
+                let Some(told) = &thermal else { return model.alone(&linear(run), &runs) };
+                let alone = model.alone(&linear(&told.taken_out(run)), &runs)?;
+                // a run has the bias of its own temperature
+                Some(Alone { bias: alone.bias.turned(told.mean_of(run)), ..alone })
+            })
         }),
-        discovered: Box::new(move |run| applied.left(run)),
+        discovered: Box::new(move |run| match &thermal {
+            Some(told) => applied.left(&told.taken_out(run)),
+            None => applied.left(run),
+        }),
         readout: None,
         direction: Box::new(move |run| {
             sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
@@ -237,8 +277,8 @@ fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
                 let (value, deviation) = (-value / gain, deviation / gain.abs());
                 Some(effect(EffectId::AngleLatency, "latency", "s", value, deviation))
             }
-            // the scale factor is k, and a run's own bias is no effect of the instrument
-            Term::Scale | Term::BiasOf(_) | Term::Response => None,
+            // the scale factor is k, a run's own bias is no effect of the instrument, and one that goes with the temperature is told by itself
+            Term::Scale | Term::BiasOf(_) | Term::BiasPerKelvin | Term::Response => None,
         })
         .collect()
 }

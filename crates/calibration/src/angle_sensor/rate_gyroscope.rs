@@ -18,7 +18,7 @@ use super::samples::SensorRun;
 use super::sensor::Sensor;
 
 /// A lag is kept where the rms of blocks that were left out in turn falls by at least this share.
-const LEAST_FALL: f64 = 0.01;
+pub(super) const LEAST_FALL: f64 = 0.01;
 /// … and a response is said where it falls by this share beside the lag.
 const RESPONSE_FALL: f64 = 0.3;
 /// Share of the reference's variance beside a line in time, below which a scale factor is not told from a bias.
@@ -68,7 +68,7 @@ pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term], law: 
 }
 
 /// Sum of squares of interleaved blocks that were left out in turn, rad².
-fn left_out_in_turn(stretches: &[Stretch], folds: &Folds, terms: &[Term]) -> f64 {
+pub(super) fn left_out_in_turn(stretches: &[Stretch], folds: &Folds, terms: &[Term]) -> f64 {
     let rows: Vec<(Row, usize)> = rows(stretches, terms).into_iter().zip(folds.fold.iter().copied()).collect();
     let square_of = |out: usize| {
         let values = solved(rows.iter().filter(|r| r.1 != out).map(|r| &r.0), terms.len());
@@ -137,7 +137,7 @@ pub(crate) struct RateGyroscope {
 /// A left-out part and what is fitted without it.
 pub(super) struct Split {
     train: Vec<Stretch>,
-    test: Stretch,
+    pub(super) test: Stretch,
 }
 
 pub(super) fn splits(all: &[Stretch]) -> Vec<Split> {
@@ -256,7 +256,7 @@ impl RateGyroscope {
     }
 }
 
-fn stretches(runs: &[SensorRun], sensor: &Sensor, lag_s: f64) -> Option<Vec<Stretch>> {
+pub(super) fn stretches(runs: &[SensorRun], sensor: &Sensor, lag_s: f64) -> Option<Vec<Stretch>> {
     runs.iter().enumerate().map(|(number, run)| Stretch::new(run, number, sensor, lag_s)).collect()
 }
 

@@ -8,7 +8,7 @@ use crate::numerics::interpolation;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{median, robust_deviation};
 
-/// One of the three terms.
+/// One of the terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Term {
     /// b, rad/s
@@ -17,6 +17,8 @@ pub(crate) enum Term {
     BiasOf(usize),
     /// s, of the reference's angle
     Scale,
+    /// how the bias goes with the temperature, rad/s/K
+    BiasPerKelvin,
     /// l, s
     Lag,
     /// c, s², of the acceleration a lag ago: what a response is besides late
@@ -50,6 +52,8 @@ pub(super) struct Stretch {
     pub(super) rate: Vec<f64>,
     /// acceleration of the reference a lag ago, rad/s²
     acceleration: Vec<f64>,
+    /// how much warmer it was for how long since the first row, K s; none where that is not asked for
+    warmth: Option<Vec<f64>>,
     pub(super) error: Vec<f64>,
 }
 
@@ -65,6 +69,7 @@ impl Stretch {
             reference: run.reference_rad.clone(),
             rate: mean_rates(run, lag_s),
             acceleration: ago(&run.t_s, &run.acceleration_rad_s2, lag_s),
+            warmth: None,
             error,
         })
     }
@@ -73,7 +78,7 @@ impl Stretch {
     #[cfg(test)]
     pub(super) fn of(t: Vec<f64>, reference: Vec<f64>, error: Vec<f64>) -> Self {
         let none = vec![0.0; t.len()];
-        Self { run: 0, t, reference, rate: none.clone(), acceleration: none, error }
+        Self { run: 0, t, reference, rate: none.clone(), acceleration: none, warmth: None, error }
     }
 
     /// First rows of so many parts, and the end of the last: alike in time, or, where one of them would hold most of the way that the
@@ -110,6 +115,7 @@ impl Stretch {
             reference: self.reference[rows.clone()].to_vec(),
             rate: self.rate[rows.clone()].to_vec(),
             acceleration: self.acceleration[rows.clone()].to_vec(),
+            warmth: self.warmth.as_ref().map(|warmth| warmth[rows.clone()].to_vec()),
             error: self.error[rows].to_vec(),
         }
     }
@@ -119,6 +125,7 @@ impl Stretch {
             Term::Bias => self.t[i],
             Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
             Term::Scale => self.reference[i],
+            Term::BiasPerKelvin => self.warmth.as_ref().map_or(0.0, |warmth| warmth[i]),
             Term::Lag => self.rate[i],
             Term::Response => self.acceleration[i],
         }
@@ -127,6 +134,11 @@ impl Stretch {
     /// Whether its rate varies by enough of the fastest one to tell what goes with the rate from what goes with the time.
     pub(super) fn varies(&self, fastest: f64) -> bool {
         variance(&self.rate).sqrt() > VARYING_RATE * fastest
+    }
+
+    /// The same beside how much warmer it was for how long, K s.
+    pub(super) fn with_warmth(self, warmth: Vec<f64>) -> Self {
+        Self { warmth: Some(warmth), ..self }
     }
 
     /// The same with another error.

@@ -3,6 +3,7 @@
 
 use super::rails::without_rails_of_their_own;
 use crate::data::table::{integrated, turned};
+use crate::data::track::held;
 use crate::error::Refusal;
 use crate::numerics::statistics::span;
 use crate::recording::{Campaign, Reference, Role, Run};
@@ -80,7 +81,7 @@ impl SensorRun {
             rate_rad_s,
             acceleration_rad_s2,
             reading,
-            temp_c: r.temp_c.map(|temp| temp[settled].to_vec()),
+            temp_c: r.temp_c.filter(|t| t.iter().any(|v| v.is_finite())).map(|temp| held(temp)[settled].to_vec()),
             recorded: None,
         })
     }

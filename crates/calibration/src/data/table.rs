@@ -6,6 +6,7 @@
 use std::f64::consts::TAU;
 
 use crate::numerics::angles::wrapped;
+use crate::numerics::interpolation::accumulated;
 use crate::numerics::statistics::median;
 use crate::recording::Recording;
 
@@ -36,15 +37,7 @@ pub(crate) fn input_angle(recording: &mut Recording) -> (Vec<f64>, bool) {
 
 /// The angle, rad, that a rate in degrees goes by trapezoids.
 pub(crate) fn integrated(t: &[f64], rate: &[f64]) -> Vec<f64> {
-    let mut angle = 0.0;
-    let mut out = Vec::with_capacity(t.len());
-    for i in 0..rate.len().min(t.len()) {
-        if i > 0 {
-            angle += 0.5 * (rate[i] + rate[i - 1]).to_radians() * (t[i] - t[i - 1]);
-        }
-        out.push(angle);
-    }
-    out
+    accumulated(t, &rate.iter().map(|r| r.to_radians()).collect::<Vec<_>>())
 }
 
 /// The table's angle in degrees as a continuous one in rad: each step is the nearest to what the rate says.

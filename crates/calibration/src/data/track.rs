@@ -420,7 +420,7 @@ pub(crate) fn commanded(seen: &Envelope<f64>, v: &ControlOutputs<f64>) -> AxisFo
 }
 
 /// Missing commands take the value that was last given, as a held output does.
-fn held(mut values: Vec<f64>) -> Vec<f64> {
+pub(crate) fn held(mut values: Vec<f64>) -> Vec<f64> {
     let mut last = values.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
     for v in &mut values {
         if v.is_finite() {

@@ -64,6 +64,8 @@ pub struct Hypothesis {
     pub reference_c: Option<f64>,
     /// a rate gyroscope's bias, rad/s
     pub rate_bias_rad_s: f64,
+    /// how much more it is for every kelvin beyond `reference_c`, rad/s/K
+    pub rate_bias_per_k_rad_s: f64,
 }
 
 /// Channels of a sensor that are cut off at the rails of their converters. A channel at a rail says "at least"; the other
@@ -120,6 +122,7 @@ impl Hypothesis {
             clip: None,
             reference_c: None,
             rate_bias_rad_s: 0.0,
+            rate_bias_per_k_rad_s: 0.0,
         }
     }
 

@@ -40,6 +40,18 @@ pub(crate) fn mean_rate_before(
     -then / since_s
 }
 
+/// The integral of values over time since the first row, by trapezoids; as long as the shorter of the two.
+pub(crate) fn accumulated(t_s: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let at = |i: usize| {
+        if i > 0 {
+            sum += 0.5 * (values[i] + values[i - 1]) * (t_s[i] - t_s[i - 1]);
+        }
+        sum
+    };
+    (0..values.len().min(t_s.len())).map(at).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::{at, mean_rate_before};

@@ -69,6 +69,8 @@ struct File {
     control_latency_s: f64,
     #[serde(default, skip_serializing_if = "is_zero")]
     rate_bias_rad_s: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    rate_bias_per_k_rad_s: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     amplitude_v: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -137,6 +139,7 @@ impl Calibration {
                 })
                 .collect(),
             rate_bias_rad_s: h.rate_bias_rad_s,
+            rate_bias_per_k_rad_s: h.rate_bias_per_k_rad_s,
             amplitude_v: self.provenance.amplitude_v,
             readout_unit: self.provenance.readout_unit.clone(),
             temperature_c: h.reference_c,
@@ -203,6 +206,7 @@ impl Calibration {
         hypothesis.clip = file.clip;
         hypothesis.reference_c = file.temperature_c;
         hypothesis.rate_bias_rad_s = file.rate_bias_rad_s;
+        hypothesis.rate_bias_per_k_rad_s = file.rate_bias_per_k_rad_s;
         let provenance = Provenance {
             tool: file.tool,
             inputs: file.input,

@@ -9,6 +9,7 @@ use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::model::unknowns::Unknowns;
 use crate::numerics::angles::{unwrapped, wrapped};
+use crate::numerics::interpolation::accumulated;
 use crate::recording::{Instrument, Recording, Role, Run, RunKind};
 use crate::report::belonging::{Row, counts_the_other_way, left_in_the_radius, require_of_the_calibrated};
 use crate::report::calibration::Calibration;
@@ -66,6 +67,9 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let mut angle_rad: Vec<f64> = Vec::new();
     let mut rows = Vec::with_capacity(recording.len());
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
+    // kelvin seconds beyond the temperature that the bias refers to
+    let warmer: Vec<f64> = (0..recording.len()).map(|i| track.warmer_k(i)).collect();
+    let warmth = accumulated(&recording.t_s, &warmer);
     let none = Unknowns::new(h, Vec::new());
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     for segment in &track.segments {
@@ -76,7 +80,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
             let seen = track.envelope(i);
             let (sin, cos) = (-row.drift).sin_cos();
             let z = h.unread(seen, &at).turned(sin, cos);
-            let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s);
+            let drift_rad = h.rate_bias_rad_s * (track.t_s[i] - first_s) + h.rate_bias_per_k_rad_s * warmth[i];
             rows.push(Row {
                 t_s: track.t_s[i],
                 // its own rate says nothing of whose it is
@@ -168,11 +172,14 @@ fn same_unit(calibration: &Calibration, recording: &Recording) -> Result<(), Ref
 
 /// A recording without a temperature can be compensated where nothing follows it.
 fn needs_no_temperature(h: &Hypothesis, recording: &Recording) -> Result<(), Refusal> {
-    let follows = h.members.iter().find(|m| m.id.by_temperature());
-    let Some(member) = follows.filter(|_| recording.temp_c.is_none()) else { return Ok(()) };
+    let member = h.members.iter().find(|m| m.id.by_temperature()).map(|m| m.id.to_string());
+    let follows = member.or((h.rate_bias_per_k_rad_s != 0.0).then(|| "the bias".into()));
+    let Some(what) = follows.filter(|_| !recording.temp_c.iter().flatten().any(|t| t.is_finite())) else {
+        return Ok(());
+    };
     Err(Refusal::new(
         &recording.source.display().to_string(),
-        format!("{} follows the temperature, and there is no column temp_c", member.id),
+        format!("{what} follows the temperature, and there is no column temp_c"),
         "a recording with its temperature",
     ))
 }

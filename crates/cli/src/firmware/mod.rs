@@ -85,9 +85,16 @@ fn is_of_an_angle(calibration: &Calibration) -> bool {
 /// Why there is no header of this gyroscope, and what there is.
 fn of_a_gyroscope(h: &Hypothesis) -> String {
     if h.period_rad > 4.0 {
+        let of_the_temperature =
+            h.reference_c.filter(|_| h.rate_bias_per_k_rad_s != 0.0).map_or_else(String::new, |at| {
+                format!(
+                    " and {:.9} deg/s more for every kelvin beyond {at:.3} °C",
+                    h.rate_bias_per_k_rad_s.to_degrees()
+                )
+            });
         return format!(
-            "the calibration of a rate gyroscope is two numbers: take its bias, {:.9} deg/s, from each rate, and divide by its scale \
-             factor, {:.9}",
+            "the calibration of a rate gyroscope is two numbers: take its bias, {:.9} deg/s{of_the_temperature}, from each rate, and \
+             divide by its scale factor, {:.9}",
             h.rate_bias_rad_s.to_degrees(),
             h.angular_gain.abs()
         );
