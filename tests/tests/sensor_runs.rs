@@ -273,3 +273,31 @@ fn rows_that_stand_still_while_the_table_turns_are_named_and_left_out() {
         }
     }
 }
+
+/// A magnetometer that is turned by hand, once all round, and once held in one direction with a glance the other way: an ellipse of any
+/// width goes through those, by the noise, and none of them says that it is of another sensor.
+#[test]
+fn a_run_in_few_directions_is_of_the_sensor_whose_ellipse_it_lies_on() {
+    for seed in 0..16 {
+        let mut noise = Noise::new(seed);
+        let mut along = |file: &str, role, directions: Vec<f64>| {
+            let mut read = |a: &f64| {
+                let (sin, cos) = a.to_radians().sin_cos();
+                (0.5 * cos + 0.01 + 0.003 * noise.sample(), 0.52 * sin + 0.01 * cos - 0.01 + 0.003 * noise.sample())
+            };
+            let (x, y) = directions.iter().map(&mut read).unzip();
+            let t_s = (0..directions.len()).map(|i| 0.01 * i as f64).collect();
+            let recording =
+                Recording { t_s, table_deg: Some(directions), xc_v: Some(x), yc_v: Some(y), ..Recording::default() };
+            run(file, role, recording)
+        };
+        let round = (0..900).map(|i| 0.8 * f64::from(i)).collect();
+        // 16° about 270°, and as many about 90°
+        let few = (0..300)
+            .map(|i| if i < 240 { 262.0 + f64::from(i) / 15.0 } else { 82.0 + f64::from(i - 240) / 3.75 })
+            .collect();
+        let runs = vec![along("round.csv", Role::Fit, round), along("few.csv", Role::Holdout, few)];
+        let i = cvg_calibration::identify(sensor(runs), &cvg_calibration::Options::default());
+        assert!(i.is_ok(), "seed {seed}: {}", i.err().map_or(String::new(), |refusal| refusal.to_string()));
+    }
+}

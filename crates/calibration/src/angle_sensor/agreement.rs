@@ -72,6 +72,14 @@ impl Own {
         off(&self.readout, &other.run).max(off(&other.readout, &self.run))
     }
 
+    /// One ellipse draws both, as far as the ellipse of each is known: what a run in few directions asks for by itself may be any that
+    /// goes through them, and that of another run is no worse. Each run is half as far off it as off the ellipse of the other.
+    fn are_on_one_ellipse(&self, other: &Self) -> bool {
+        let Some(both) = ellipse::algebraic(&[self.run.clone(), other.run.clone()]) else { return false };
+        let same = |own: &Self| 0.5 * SAME_CURVE.max(SAME_LEFT * own.left);
+        [self, other].iter().all(|own| off(&both, &own.run) <= same(own))
+    }
+
     fn together(&self, other: &Self) -> Together {
         if self.times(other).ln().abs() > SAME_AMPLITUDE.ln() {
             return Together::No;
@@ -79,7 +87,8 @@ impl Own {
         if self.is_on_a_circle_beside(other) || other.is_on_a_circle_beside(self) {
             return Together::No;
         }
-        if self.across(other) <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left)) {
+        let near = self.across(other) <= SAME_CURVE.max(SAME_LEFT * self.left.max(other.left));
+        if near || self.are_on_one_ellipse(other) {
             return Together::Alike;
         }
         let rounder = |a: &Self, b: &Self| off(&a.readout, &b.run) <= LEFT_WHEN_MOUNTED_ANEW * b.as_recorded;
