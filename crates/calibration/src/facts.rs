@@ -59,9 +59,9 @@ pub enum Status {
 /// The share of what the declared model leaves that follows one thing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Share {
-    /// pattern, table, time, rate, amplitude, direction, temperature or rest
+    /// pattern, table, time, rate, amplitude, direction, temperature or rest; joined by " or " where the rows do not tell them apart
     pub of: String,
-    /// share of the variance
+    /// share of the variance, 0 to 1
     pub share: f64,
     /// its 95 % interval
     pub ci95: [f64; 2],
