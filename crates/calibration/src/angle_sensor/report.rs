@@ -15,7 +15,8 @@ use crate::estimation::residuals::Residual;
 use crate::facts::Follows;
 use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Origin};
-use crate::numerics::statistics::median;
+use crate::numerics::linear::NormalEquations;
+use crate::numerics::statistics::{median, root_mean_square};
 use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
@@ -196,7 +197,9 @@ pub(crate) fn report(
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, discovered)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
     let plots = with_plots.then(|| plots(&names, raw.as_ref(), declared, discovered, &finding));
-    let (reported, temperature) = runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered], &mut warnings);
+    let (mut reported, odd, temperature) =
+        runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered], &mut warnings);
+    let angular_gain = covering_all(&finding, &odd, &mut reported, &mut warnings);
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -205,7 +208,7 @@ pub(crate) fn report(
         inputs: head.inputs.clone(),
         device: head.device.clone(),
         instrument: finding.instrument.name().into(),
-        angular_gain: finding.angular_gain,
+        angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
         unexplained: described(&effects, &finding),
@@ -377,15 +380,16 @@ fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained
     out
 }
 
-/// What each run tells, and how that goes with the temperature.
+/// What each run tells, the angular gains among that which contradict that of all, and how it goes with the temperature.
 fn runs(
     head: &Head,
     finding: &Finding<'_>,
     [fitted, held]: [&[SensorRun]; 2],
     [on_fit, after]: [&Evaluation; 2],
     warnings: &mut Vec<String>,
-) -> (Vec<RunReport>, Option<Temperature>) {
+) -> (Vec<RunReport>, Vec<f64>, Option<Temperature>) {
     let mut out = head.runs.clone();
+    let mut odd = Vec::new();
     let mut steady = vec![None; out.len()];
     let both = fitted.iter().zip(&on_fit.segments).zip(&on_fit.kept).map(|x| (x, true));
     for (((run, s), kept), is_fit) in both.chain(held.iter().zip(&after.segments).zip(&after.kept).map(|x| (x, false)))
@@ -399,7 +403,7 @@ fn runs(
         r.rms_deg = Some(own.size().rms_deg);
         let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
         if is_fit || !shared {
-            warnings.extend(tell(r, run, finding, kept));
+            warnings.extend(tell(r, run, finding, kept, &mut odd));
             let speed = run.rate_rad_s.iter().map(|w| w.abs()).sum::<f64>() / run.len() as f64;
             steady[run.number] = Some(rate).filter(|r| r.abs() > ONE_WAY * speed.to_degrees());
         }
@@ -422,12 +426,18 @@ fn runs(
     };
     let seen: Vec<Seen> = out.iter().zip(steady).filter_map(see).collect();
     let temperature = temperature(&seen, finding.hypothesis.sense());
-    (out, temperature)
+    (out, odd, temperature)
 }
 
 /// Gain and bias as one run alone tells them, and the gain ratio of channels beside a temperature; says where they are not those of all
-/// runs.
-fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]) -> Vec<String> {
+/// runs, and adds the gain to `odd_gains` then.
+fn tell(
+    r: &mut RunReport,
+    run: &SensorRun,
+    finding: &Finding<'_>,
+    kept: &[bool],
+    odd_gains: &mut Vec<f64>,
+) -> Vec<String> {
     if r.temp_c.is_some() && run.channels().is_some() {
         r.detection_gain_ratio = super::ellipse::gain_ratio(&run.as_recorded());
     }
@@ -442,15 +452,25 @@ fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]
     let bias = in_degrees(alone.bias);
     r.bias_dps = Some(bias);
     let (turned, seconds) = (run.travel_rad().to_degrees(), run.t_s[run.len() - 1] - run.t_s[0]);
-    let usual = r.rms_deg.unwrap_or(0.0);
+    let is_gyroscope = finding.instrument == Instrument::Gyroscope;
+    // what a gain of its own makes is part of what all runs leave of a run
+    let usual = if is_gyroscope {
+        beside_its_own(run, &(finding.discovered)(run), &rows).to_degrees()
+    } else {
+        r.rms_deg.unwrap_or(0.0)
+    };
     let odd = |own: &Estimate, all: &Estimate, over: f64| {
         let off = (own.value - all.value).abs();
         off > own.half_width() + all.half_width() && off * over > ODD * usual
     };
     // a scale factor that goes with the rate is said to, and runs at other rates do not contradict it
-    let of_gain = (finding.scale_factor.is_none() && odd(&gain, &finding.angular_gain, turned)).then(|| {
+    let is_odd = finding.scale_factor.is_none() && odd(&gain, &finding.angular_gain, turned);
+    // a sensor's is a whole number, or stated
+    odd_gains.extend((is_odd && is_gyroscope).then_some(gain.value));
+    let covered = if is_gyroscope { ", whose interval covers both" } else { "" };
+    let of_gain = is_odd.then(|| {
         format!(
-            "{}: its angular gain is {:.5}, that of all runs {:.5}",
+            "{}: its angular gain is {:.5}, that of all runs {:.5}{covered}",
             run.name, gain.value, finding.angular_gain.value
         )
     });
@@ -459,6 +479,43 @@ fn tell(r: &mut RunReport, run: &SensorRun, finding: &Finding<'_>, kept: &[bool]
     });
     r.agrees = Some(of_gain.is_none() && of_bias.is_none());
     of_gain.into_iter().chain(of_bias).collect()
+}
+
+/// What is left of a run beside a gain and a bias of its own, rms, rad: what these move the angle by is held against it.
+fn beside_its_own(run: &SensorRun, left: &[f64], rows: &[usize]) -> f64 {
+    let middle = |v: &dyn Fn(usize) -> f64| rows.iter().map(|&i| v(i)).sum::<f64>() / rows.len().max(1) as f64;
+    let (t, a, e) = (|i: usize| run.t_s[i], |i: usize| run.reference_rad[i], |i: usize| left[i]);
+    let middles = [middle(&t), middle(&a), middle(&e)];
+    let own = |i: usize| [t(i) - middles[0], a(i) - middles[1]];
+    let mut equations = NormalEquations::new(2);
+    rows.iter().for_each(|&i| equations.add(&own(i), e(i) - middles[2]));
+    let values = equations.solve();
+    let beside = |&i: &usize| e(i) - middles[2] - own(i).iter().zip(&values).map(|(x, v)| x * v).sum::<f64>();
+    root_mean_square(&rows.iter().map(beside).collect::<Vec<_>>())
+}
+
+/// The angular gain with an interval that covers those of runs that contradict it, `odd` among them. Of two runs that of all lies
+/// between: there it is enough that they exclude each other, which they are said to.
+fn covering_all(finding: &Finding<'_>, odd: &[f64], runs: &mut [RunReport], warnings: &mut Vec<String>) -> Estimate {
+    let all = finding.angular_gain;
+    let mut apart = odd.to_vec();
+    let told: Vec<(usize, Estimate)> =
+        runs.iter().enumerate().filter_map(|(i, r)| Some((i, r.angular_gain?))).collect();
+    if let [(a, of_a), (b, of_b)] = told[..]
+        && odd.is_empty()
+        && finding.instrument == Instrument::Gyroscope
+        && finding.scale_factor.is_none()
+        && (of_a.value - of_b.value).abs() > of_a.half_width() + of_b.half_width()
+    {
+        warnings.push(format!(
+            "the angular gain of {} is {:.5} and that of {} {:.5}, which exclude each other: that of both covers them",
+            runs[a].file, of_a.value, runs[b].file, of_b.value
+        ));
+        [a, b].into_iter().for_each(|i| runs[i].agrees = Some(false));
+        apart.extend([of_a.value, of_b.value]);
+    }
+    let farthest = apart.iter().map(|own| (own - all.value).abs()).fold(0.0, f64::max);
+    all.widened((farthest - all.half_width()).max(0.0))
 }
 
 fn curves(
