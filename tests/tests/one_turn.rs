@@ -143,3 +143,38 @@ fn a_joint_is_predicted_within_the_part_it_turns_through_and_not_thrown_off_beyo
         assert!(largest < 2.5, "{share} of a turn: {largest}°");
     }
 }
+
+/// A joint of 201°, whose last quarter is held out: the three that are fitted are less than half a turn, and the run is not.
+#[test]
+fn a_joint_that_turns_through_more_than_half_a_turn_is_followed() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let places: Vec<f64> = (0..113).map(|i| 1.8 * f64::from(i)).collect();
+        let theta = |d: f64| d + 0.2 * d.to_radians().sin() + 0.005 * noise.sample();
+        let i = cvg_calibration::identify(
+            sensor(vec![a_row_a_second(places, theta, Role::Fit)]),
+            &cvg_calibration::Options::default(),
+        );
+        // whether a part of a turn predicts the rest is another question
+        assert!(i.is_ok(), "seed {seed}: {}", i.err().map_or(String::new(), |refusal| refusal.to_string()));
+    }
+}
+
+/// An encoder in one pass of 270° of its turn, with what its poles leave in it: the time got a share of +109 and the angle one of −108.
+#[test]
+fn in_one_pass_time_and_angle_have_no_share_of_their_own() {
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let places: Vec<f64> = (0..1060).map(|i| 0.34 * f64::from(i)).collect();
+        let error = |a: f64| 0.2 * a.sin() + 0.1 * (2.0 * a).cos() + 0.1 * (126.0 * a).sin();
+        let theta = |d: f64| d + error(d.to_radians()) + 0.02 * noise.sample();
+        let i = identified(sensor(vec![a_row_a_second(places, theta, Role::Fit)]));
+        let shares = &i.report.decomposition;
+        assert!(shares.iter().all(|s| s.of != "time" && s.of != "pattern"), "seed {seed}: {shares:?}");
+        let possible = |share: f64| (0.0..=1.0).contains(&share);
+        assert!(
+            shares.iter().all(|s| possible(s.share) && s.ci95.iter().all(|c| possible(*c))),
+            "seed {seed}: {shares:?}"
+        );
+    }
+}

@@ -180,13 +180,16 @@ fn require_an_angle(campaign: &Campaign) -> Result<(), Refusal> {
     }
 }
 
-/// A sensor turns through half a turn in one run at least, of which a part may be held out.
-fn require_a_turn([runs, held]: [&[SensorRun]; 2], gain: f64, period: f64) -> Result<(), Refusal> {
-    let whole = |run: &SensorRun| {
-        let parts = [runs, held].into_iter().flatten().filter(|part| part.number == run.number);
-        span(&parts.flat_map(|part| part.reference_rad.iter().copied()).collect::<Vec<_>>())
-    };
-    let furthest = runs.iter().map(|run| whole(run) * gain.abs()).fold(0.0, f64::max);
+/// How far the reference turns in the whole of a run, of which a part may be held out, rad.
+fn travel_of_the_whole([fitted, held]: [&[SensorRun]; 2], run: &SensorRun) -> f64 {
+    let parts = [fitted, held].into_iter().flatten().filter(|part| part.number == run.number);
+    span(&parts.flat_map(|part| part.reference_rad.iter().copied()).collect::<Vec<_>>())
+}
+
+/// A sensor turns through half a turn in one run at least.
+fn require_a_turn(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result<(), Refusal> {
+    let [runs, _] = parts;
+    let furthest = runs.iter().map(|run| travel_of_the_whole(parts, run) * gain.abs()).fold(0.0, f64::max);
     if furthest < HALF_A_TURN {
         let name = runs.first().map_or("campaign", |r| r.name.as_str());
         return Err(Refusal::new(
@@ -202,8 +205,9 @@ fn require_a_turn([runs, held]: [&[SensorRun]; 2], gain: f64, period: f64) -> Re
 }
 
 /// An angle that hardly turns while its reference does is none of it: as a rule it is a rate, or in another unit.
-fn require_following(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), Refusal> {
-    let travel = |run: &SensorRun| run.travel_rad() * gain.abs();
+fn require_following(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result<(), Refusal> {
+    let [runs, _] = parts;
+    let travel = |run: &SensorRun| travel_of_the_whole(parts, run) * gain.abs();
     let furthest = runs.iter().filter(|r| r.channels().is_none()).max_by(|a, b| travel(a).total_cmp(&travel(b)));
     let Some((run, Reading::Angle(theta))) = furthest.map(|run| (run, &run.reading)) else { return Ok(()) };
     let slope = line(&run.reference_rad, &unwrapped(theta.iter().copied(), period)).0 / gain;
@@ -222,7 +226,7 @@ fn require_following(runs: &[SensorRun], gain: f64, period: f64) -> Result<(), R
         &run.name,
         format!(
             "theta_deg does not follow the reference, which turns through {:.0}°{turns}",
-            run.travel_rad().to_degrees()
+            travel_of_the_whole(parts, run).to_degrees()
         ),
         of_the_angle(run).unwrap_or_else(|| {
             "the sensor's angle as theta_deg; of a rate gyroscope theta_deg = \"integral(COLUMN)\" in [columns] and period_deg = 360 in [campaign] of campaign.toml, without --sensor".into()
@@ -325,7 +329,7 @@ fn sensor_finding(
     if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
         thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
     }
-    require_following(runs, model.sensor.gain, period)?;
+    require_following([runs, held], model.sensor.gain, period)?;
     let thinned = thinned(runs);
     let described = Described { model: &model, deviations: &deviations };
     let raw_turns = raw_turns(&model);
