@@ -8,6 +8,7 @@ use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel, positions};
 use super::odd_runs::without_odd_runs;
+use super::pattern_or_rate::Rate;
 use super::rate_finding::{Stated, rate_finding};
 use super::rate_runs;
 use super::readout::Kind;
@@ -41,22 +42,24 @@ pub(crate) fn serves(campaign: &Campaign) -> bool {
     campaign.instrument == Instrument::Sensor || is_rate_gyroscope(campaign)
 }
 
-/// The angular gain of the integral of a rate is its scale factor, which is 1 within this: that of a vibration's pattern is less.
-const SCALE_FACTOR: f64 = 0.05;
-
 /// A gyroscope whose only output is an angle that goes round once a turn, turned about its input axis and perhaps others; not one
-/// that is stated to follow a share of the turn, as a pattern does.
+/// whose angle is a pattern's.
 pub(crate) fn is_rate_gyroscope(campaign: &Campaign) -> bool {
+    rate(campaign) != Rate::No
+}
+
+/// What says that a campaign is of a rate gyroscope.
+fn rate(campaign: &Campaign) -> Rate {
     let of_one = |run: &Run| {
         matches!(run.kind, RunKind::Rotation | RunKind::CrossAxis)
             && run.recording.theta_deg.is_some()
             && run.recording.xc_v.is_none()
     };
-    campaign.instrument == Instrument::Gyroscope
+    let may_be = campaign.instrument == Instrument::Gyroscope
         && campaign.period_deg == Some(360.0)
-        && campaign.angular_gain.is_none_or(|k| (k.abs() - 1.0).abs() < SCALE_FACTOR)
         && campaign.runs.iter().all(of_one)
-        && campaign.runs.iter().any(|run| run.kind == RunKind::Rotation)
+        && campaign.runs.iter().any(|run| run.kind == RunKind::Rotation);
+    if may_be { Rate::of(campaign) } else { Rate::No }
 }
 
 /// Harmonics of the position in the decomposition; rows that each of its unknowns needs.
@@ -82,7 +85,8 @@ pub(crate) fn identify(
     options: &Options<'_>,
     with_plots: bool,
 ) -> Result<Identification, Refusal> {
-    let rate_gyroscope = is_rate_gyroscope(&campaign);
+    let rate = rate(&campaign);
+    let rate_gyroscope = rate != Rate::No;
     require_an_angle(&campaign)?;
     let instrument = campaign.instrument;
     // a number of periods has no sense: the sign of angular_gain states it, and the data where there is none
@@ -98,7 +102,7 @@ pub(crate) fn identify(
     let head = Head::of(&campaign);
     let across = cross_axis::take(&mut campaign);
     (options.progress)("preparing the runs");
-    let mut left_out = Vec::new();
+    let mut left_out: Vec<String> = rate.said().into_iter().collect();
     for run in campaign.runs.iter_mut().filter(|run| run.kind == RunKind::Rotation) {
         left_out.extend(go_on_evenly(&mut run.recording));
         if !rate_gyroscope {

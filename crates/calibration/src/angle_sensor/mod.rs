@@ -15,6 +15,7 @@ pub(crate) mod likeness;
 mod lines;
 pub(crate) mod model;
 mod odd_runs;
+mod pattern_or_rate;
 mod rails;
 mod rate_alone;
 mod rate_deviations;
