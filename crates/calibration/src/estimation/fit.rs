@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::data::track::{LARGEST_TURN, Segment, Track};
-use crate::estimation::coloured_noise::DRIFT_RAD_S;
+use crate::estimation::coloured_noise::{ColouredNoise, DRIFT_RAD_S};
 use crate::estimation::propagation::{Start, Stepping, propagate};
 use crate::estimation::sums::{Own, Sums};
 use crate::model::hypothesis::{Hypothesis, Unknown};
@@ -82,6 +82,8 @@ pub(crate) struct Fit {
     pub(crate) covariance: DMatrix<f64>,
     /// the part of it that the residuals' noise makes; the rest is what considered unknowns could be
     pub(crate) by_noise: DMatrix<f64>,
+    /// what its residuals remember, after the last step
+    pub(crate) coloured: Option<ColouredNoise>,
     /// starts of the segments, per track
     pub(crate) starts: Vec<Vec<Start>>,
     /// Σ(r/σ)² over angle residuals, and over amplitude residuals, before the last step
@@ -218,6 +220,7 @@ pub(crate) fn at_rest(tracks: &[Prepared], hypothesis: &Hypothesis, unknowns: &[
         unknowns: unknowns.to_vec(),
         covariance: DMatrix::zeros(n, n),
         by_noise: DMatrix::zeros(n, n),
+        coloured: None,
         starts: tracks.iter().map(|t| t.starts.clone()).collect(),
         chi2: [0.0; 2],
         prior_chi2: 0.0,

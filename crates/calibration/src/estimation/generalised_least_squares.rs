@@ -222,7 +222,7 @@ pub(crate) fn refine(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option
     let (mut fit, parts, normal) = best?;
     let (covariance, disagreement) = covariance(&parts, &normal)?;
     let solution = normal.solution()?;
-    (fit.covariance, fit.by_noise) = (solution.covariance, solution.by_noise);
+    (fit.covariance, fit.by_noise, fit.coloured) = (solution.covariance, solution.by_noise, Some(noise));
     Some(Refined { fit, covariance, disagreement })
 }
 
@@ -230,7 +230,7 @@ pub(crate) fn refine(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option
 /// was fitted.
 pub(crate) fn linearised(tracks: &[Prepared], fit: &Fit, priors: &[Prior]) -> Option<Normal> {
     let problem = Problem::new(tracks, fit, priors);
-    let parts = problem.parts(fit, &problem.noise(fit));
+    let parts = problem.parts(fit, &fit.coloured.unwrap_or_else(|| problem.noise(fit)));
     let mut normal = problem.beliefs(fit);
     parts.iter().for_each(|p| normal.add(&p.whitened, 1.0));
     let worth = left(&parts, &normal, &normal.solution()?).max(disagreement(&parts, &normal)?).max(1.0).recip();
