@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_table_that_was_read_every_tenth_row_goes_on_evenly() {
-        let truth = read_every(1).table_deg.unwrap_or_default();
+        let exact = read_every(1).table_deg.unwrap_or_default();
         for rows in [3, 10] {
             let mut recording = read_every(rows);
             assert!(go_on_evenly(&mut recording).is_some_and(|said| said.contains(&format!("for {rows} rows"))));
@@ -119,7 +119,7 @@ mod tests {
                 .table_deg
                 .iter()
                 .flatten()
-                .zip(&truth)
+                .zip(&exact)
                 .map(|(a, b)| (a - b + 180.0).rem_euclid(360.0) - 180.0);
             let worst = off.fold(0.0, |m: f64, e| m.max(e.abs()));
             assert!(worst < 0.01, "{rows}: {worst}°");
