@@ -6,12 +6,14 @@
 use statrs::function::erf::erfc;
 
 use super::table_fit::{Sample, TableFit, only_phase};
-use crate::numerics::statistics::{lower_quartile, median, span};
+use crate::numerics::statistics::{median, span};
 
 /// False-alarm probability over all lines tried.
 const FALSE_ALARM: f64 = 0.01;
-/// Highest line that is looked for.
-const HIGHEST: u32 = 128;
+/// Highest line that is looked for: among many rows, and where there are few, so that ordinates times rows stay in bounds.
+const HIGHEST_OF_MANY: usize = 128;
+const HIGHEST: usize = 512;
+const ORDINATES_TIMES_ROWS: usize = 2_000_000;
 /// Fewest lines to tell noise from.
 const FEWEST: usize = 8;
 /// The first harmonics of the sensor's period are left to the table, even where it was chosen shorter.
@@ -47,7 +49,8 @@ pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, c
     let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
     let resolved = std::f64::consts::PI / spacing(&reference).max(1e-12) + 0.01;
     let repeats = span(&reference) > TURNS_OF_A_SLOW_LINE * std::f64::consts::TAU;
-    let tried: Vec<u32> = (1..=HIGHEST.min(resolved as u32))
+    let highest = highest(reference.len());
+    let tried: Vec<u32> = (1..=highest.min(resolved as u32))
         .filter(|n| !fitted.shape.lines.contains(n))
         .filter(|n| repeats || f64::from(*n) > cycles_per_turn)
         .filter(|n| !belongs_to_table(*n, fitted.shape.order, cycles_per_turn))
@@ -70,7 +73,7 @@ pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, c
     }
     let first = ranked[0];
     // stations of several runs at unlike places tell some of what each by itself does not resolve
-    let beyond = folded(first.0, &reference).filter(|n| f64::from(*n) > resolved && *n <= HIGHEST);
+    let beyond = folded(first.0, &reference).filter(|n| f64::from(*n) > resolved && *n <= highest);
     let beyond = beyond.filter(|n| coherence(first.0, *n, &reference) < SAME);
     ranked.extend(beyond.map(|n| (n, power(f64::from(n), &reference, &left))));
     let aliases = ranked.into_iter().filter(|a| a.1 > ALIAS * first.1 && coherence(first.0, a.0, &reference) > ALIAS);
@@ -107,16 +110,40 @@ pub(crate) fn alias_elsewhere(n: u32, fitted: &[f64], asked: &[f64]) -> Option<u
     })
 }
 
-/// The step of which all distances between neighbouring stations are multiples. Where stations were left out, the lower
-/// quartile of their distances is still the spacing, or, where they were left out in a pattern, a few times as much.
+/// Highest line that is looked for among so many rows.
+#[allow(clippy::cast_possible_truncation, reason = "at most HIGHEST")]
+fn highest(rows: usize) -> u32 {
+    (ORDINATES_TIMES_ROWS / rows.max(1)).clamp(HIGHEST_OF_MANY, HIGHEST) as u32
+}
+
+/// The step of which all distances between neighbouring stations are multiples, in whatever order these were recorded. Where stations
+/// were left out, the lower quartile of their distances is still the spacing, or, where they were left out in a pattern, a few times as
+/// much.
 fn spacing(reference: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = reference.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
-    let usual = lower_quartile(&mut steps);
+    let mut places = reference.to_vec();
+    places.sort_by(f64::total_cmp);
+    let mut steps: Vec<f64> = places.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0).collect();
+    // what is far nearer than most of the way is made in is one station, met again
+    let again = OFF_THE_GRID * half_of_the_way(&mut steps);
+    steps.retain(|s| *s > again);
+    let usual = steps.get(steps.len() / 4).copied().unwrap_or(0.0);
     let divides = |parts: &f64| {
         let unit = usual / parts;
         steps.iter().all(|s| (s / unit - (s / unit).round()).abs() < OFF_THE_GRID)
     };
     (1..=MOST_PARTS).map(f64::from).find(divides).map_or(usual, |parts| usual / parts)
+}
+
+/// Sorts distances; half of the way is made in those that are no longer than this one. 0 of none.
+fn half_of_the_way(steps: &mut [f64]) -> f64 {
+    steps.sort_by(f64::total_cmp);
+    let half = 0.5 * steps.iter().sum::<f64>();
+    let mut gone = 0.0;
+    let reached = |s: &&f64| {
+        gone += **s;
+        gone >= half
+    };
+    steps.iter().find(reached).copied().unwrap_or(0.0)
 }
 
 /// Whether a line is a harmonic of the sensor's period that a table of so many harmonics holds, or could.
@@ -166,6 +193,39 @@ mod tests {
         let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![], free_gain: false };
         let fitted = TableFit::new(&shape, &samples, 1, 1.0).unwrap();
         assert_eq!(strongest_and_its_aliases(&samples, &fitted, 1.0)[0], 36);
+    }
+
+    /// Stations at even distances of a turn, met in this order; a line of so many per turn beside noise.
+    fn of_stations(order: &[u32], count: u32, line: f64, jitter: f64) -> Vec<Sample> {
+        let [noise, off] = [3, 5].map(|seed| remembered(0.0, order.len(), seed));
+        let sample = |(i, station): (usize, &u32)| {
+            let reference = std::f64::consts::TAU * (f64::from(*station) + jitter * off[i]) / f64::from(count);
+            let error = 3e-3 * (line * reference + 0.4).cos() + 5e-4 * noise[i];
+            Sample { theta: reference + error, error, reference, rate: 1.0, acceleration: 0.0, run: 0 }
+        };
+        order.iter().enumerate().map(sample).collect()
+    }
+
+    fn found(samples: &[Sample]) -> Vec<u32> {
+        let shape = Shape { form: Form::Own, order: 0, motion: Motion::None, lines: vec![], free_gain: false };
+        strongest_and_its_aliases(samples, &TableFit::new(&shape, samples, 1, 1.0).unwrap(), 1.0)
+    }
+
+    #[test]
+    fn a_line_of_many_per_turn_is_none_of_its_overtones_or_differences() {
+        let in_order: Vec<u32> = (0..1024).collect();
+        for line in [101, 252, 378] {
+            assert_eq!(found(&of_stations(&in_order, 1024, f64::from(line), 0.0)), [line]);
+        }
+    }
+
+    #[test]
+    fn stations_are_resolved_in_whatever_order_they_were_met() {
+        let shuffled: Vec<u32> = (0..300).map(|i| (i * 97) % 300).collect();
+        let there_and_back: Vec<u32> = (0..300).chain((0..300).rev()).collect();
+        for (order, jitter) in [(&shuffled, 0.0), (&there_and_back, 0.0), (&there_and_back, 0.01)] {
+            assert_eq!(found(&of_stations(order, 300, 50.0, jitter))[0], 50);
+        }
     }
 
     #[test]

@@ -11,6 +11,8 @@
 //! that turns back once, nothing tells it from a slip there: the jump is then kept out of the bias and is no lag of the
 //! instrument.
 
+use rayon::prelude::*;
+
 use super::cross_validation::Folds;
 use super::rate_deviations::{T_PARTS, deviations, of_a_walk};
 use super::rate_regression::{ErrorLaw, Row, Stretch, Term, ago, estimate, mean_rates, rows, solved, variance};
@@ -50,21 +52,23 @@ fn beside_the_others(stretches: &[Stretch], terms: &[Term], at: usize) -> f64 {
 /// Estimates from every split, with a lag of zero where what is left of the runs does not tell one; and whether each tells it.
 pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term], law: ErrorLaw) -> (Vec<Vec<f64>>, bool) {
     let Some(at) = terms.iter().position(|t| *t == Term::Lag) else {
-        return (splits.iter().map(|s| estimate(&s.train, terms, law)).collect(), true);
+        return (splits.par_iter().map(|s| estimate(&s.train, terms, law)).collect(), true);
     };
     let least = LEFT_BY_A_PART * beside_the_others(all, terms, at);
     let others: Vec<Term> = terms.iter().copied().filter(|t| *t != Term::Lag).collect();
-    let mut told = true;
-    let fits = splits.iter().map(|s| {
-        if beside_the_others(&s.train, terms, at) > least {
-            return estimate(&s.train, terms, law);
-        }
-        told = false;
-        let mut values = estimate(&s.train, &others, law);
-        values.insert(at, 0.0);
-        values
-    });
-    (fits.collect(), told)
+    let fits: Vec<(Vec<f64>, bool)> = splits
+        .par_iter()
+        .map(|s| {
+            if beside_the_others(&s.train, terms, at) > least {
+                return (estimate(&s.train, terms, law), true);
+            }
+            let mut values = estimate(&s.train, &others, law);
+            values.insert(at, 0.0);
+            (values, false)
+        })
+        .collect();
+    let told = fits.iter().all(|(_, told)| *told);
+    (fits.into_iter().map(|(values, _)| values).collect(), told)
 }
 
 /// Sum of squares of interleaved blocks that were left out in turn, rad².

@@ -34,9 +34,11 @@ pub(crate) enum ErrorLaw {
     Laplace,
 }
 
-/// Reweighted fits of least absolute deviations, and the smallest deviation that weighs, of the robust one (Schlossmacher 1973).
+/// Reweighted fits of least absolute deviations, the smallest deviation that weighs, of the robust one (Schlossmacher 1973), and the
+/// share of themselves by which values that have settled still change.
 const REWEIGHTED: usize = 30;
 const SMALLEST_DEVIATION: f64 = 1e-2;
+const SETTLED: f64 = 1e-9;
 
 /// Share of the way that one part of a run in time may hold: left out, one that held a turn between rests would take the scale factor
 /// with it.
@@ -120,14 +122,15 @@ impl Stretch {
         }
     }
 
-    fn regressor(&self, term: Term, i: usize) -> f64 {
+    /// A term's regressor at every row; `None` where it is nothing.
+    fn regressor(&self, term: Term) -> Option<&[f64]> {
         match term {
-            Term::Bias => self.t[i],
-            Term::BiasOf(run) => f64::from(u8::from(self.run == run)) * self.t[i],
-            Term::Scale => self.reference[i],
-            Term::BiasPerKelvin => self.warmth.as_ref().map_or(0.0, |warmth| warmth[i]),
-            Term::Lag => self.rate[i],
-            Term::Response => self.acceleration[i],
+            Term::Bias => Some(&self.t),
+            Term::BiasOf(run) => (self.run == run).then_some(&self.t),
+            Term::Scale => Some(&self.reference),
+            Term::BiasPerKelvin => self.warmth.as_deref(),
+            Term::Lag => Some(&self.rate),
+            Term::Response => Some(&self.acceleration),
         }
     }
 
@@ -153,9 +156,12 @@ impl Stretch {
 
     /// What `values` of `terms` leave of the error.
     pub(super) fn left(&self, terms: &[Term], values: &[f64]) -> Vec<f64> {
-        (0..self.error.len())
-            .map(|i| self.error[i] - terms.iter().zip(values).map(|(t, v)| v * self.regressor(*t, i)).sum::<f64>())
-            .collect()
+        let told = terms.iter().zip(values).filter_map(|(t, v)| Some((self.regressor(*t)?, v)));
+        let mut explained = vec![0.0; self.error.len()];
+        for (regressor, value) in told {
+            explained.iter_mut().zip(regressor).for_each(|(sum, r)| *sum += value * r);
+        }
+        self.error.iter().zip(explained).map(|(e, x)| e - x).collect()
     }
 }
 
@@ -180,27 +186,42 @@ pub(super) fn variance(values: &[f64]) -> f64 {
 pub(super) type Row = (Vec<f64>, f64);
 
 pub(super) fn rows(stretches: &[Stretch], terms: &[Term]) -> Vec<Row> {
-    weighted_rows(stretches, terms, |_| 1.0)
+    let mut out = Vec::new();
+    weighted_rows(stretches, terms, |_| 1.0, |row, error| out.push((row.to_vec(), error)));
+    out
 }
 
-/// Rows times the roots of their weights, about the weighted means of their stretches.
-fn weighted_rows(stretches: &[Stretch], terms: &[Term], weight: impl Fn(usize) -> f64) -> Vec<Row> {
-    let mut out = Vec::new();
+/// Takes rows times the roots of their weights, about the weighted means of their stretches.
+fn weighted_rows(
+    stretches: &[Stretch],
+    terms: &[Term],
+    weight: impl Fn(usize) -> f64,
+    mut take: impl FnMut(&[f64], f64),
+) {
     let mut first = 0;
+    let mut row = vec![0.0; terms.len()];
     for s in stretches {
-        let n = s.error.len();
-        let weights: Vec<f64> = (first..first + n).map(&weight).collect();
+        let weights: Vec<f64> = (first..first + s.error.len()).map(&weight).collect();
         let all: f64 = weights.iter().sum();
-        let mean = |f: &dyn Fn(usize) -> f64| weights.iter().enumerate().map(|(i, w)| w * f(i)).sum::<f64>() / all;
-        let means: Vec<f64> = terms.iter().map(|t| mean(&|i| s.regressor(*t, i))).collect();
-        let middle = mean(&|i| s.error[i]);
-        out.extend(weights.iter().enumerate().map(|(i, w)| {
-            let row = terms.iter().zip(&means).map(|(t, m)| w.sqrt() * (s.regressor(*t, i) - m)).collect();
-            (row, w.sqrt() * (s.error[i] - middle))
-        }));
-        first += n;
+        let mean = |values: &[f64]| weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>() / all;
+        let regressors: Vec<_> = terms.iter().map(|t| s.regressor(*t).map(|r| (r, mean(r)))).collect();
+        let middle = mean(&s.error);
+        for (i, (w, error)) in weights.iter().zip(&s.error).enumerate() {
+            let root = w.sqrt();
+            for (entry, regressor) in row.iter_mut().zip(&regressors) {
+                *entry = regressor.map_or(0.0, |(r, mean)| root * (r[i] - mean));
+            }
+            take(&row, root * (error - middle));
+        }
+        first += s.error.len();
     }
-    out
+}
+
+/// Least squares by these weights.
+fn weighted(stretches: &[Stretch], terms: &[Term], weight: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut equations = NormalEquations::new(terms.len());
+    weighted_rows(stretches, terms, weight, |row, error| equations.add(row, error));
+    equations.solve()
 }
 
 pub(super) fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -> Vec<f64> {
@@ -211,7 +232,7 @@ pub(super) fn solved<'a>(rows: impl Iterator<Item = &'a Row>, unknowns: usize) -
 
 /// The most likely values of the terms.
 pub(super) fn estimate(stretches: &[Stretch], terms: &[Term], law: ErrorLaw) -> Vec<f64> {
-    let mut values = solved(rows(stretches, terms).iter(), terms.len());
+    let mut values = weighted(stretches, terms, |_| 1.0);
     if law == ErrorLaw::Normal {
         return values;
     }
@@ -221,7 +242,11 @@ pub(super) fn estimate(stretches: &[Stretch], terms: &[Term], law: ErrorLaw) -> 
         if least <= 0.0 {
             break;
         }
-        values = solved(weighted_rows(stretches, terms, |i| least / left[i].abs().max(least)).iter(), terms.len());
+        let before = values;
+        values = weighted(stretches, terms, |i| least / left[i].abs().max(least));
+        if values.iter().zip(before).all(|(v, b)| (v - b).abs() <= SETTLED * v.abs()) {
+            break;
+        }
     }
     values
 }

@@ -12,15 +12,6 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// A quarter of the values lie below it; 0 of nothing. Reorders its argument.
-pub(crate) fn lower_quartile(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let quarter = values.len() / 4;
-    *values.select_nth_unstable_by(quarter, f64::total_cmp).1
-}
-
 /// Standard deviation about zero, from the median absolute value: spikes do not count.
 pub(crate) fn robust_deviation(values: impl Iterator<Item = f64>) -> f64 {
     let mut magnitudes: Vec<f64> = values.map(f64::abs).filter(|v| v.is_finite()).collect();
