@@ -53,87 +53,152 @@ impl Tolerance {
     }
 }
 
-/// Which rows are left out together, and which are judged together.
+/// Rows that are left out together.
 #[derive(Debug, Clone)]
-pub(crate) struct Folds {
-    /// fold of each row, all runs one after the other
-    pub(crate) fold: Vec<usize>,
-    /// block of each row
-    pub(crate) block: Vec<usize>,
-    pub(crate) count: usize,
-    /// blocks in all
-    pub(crate) blocks: usize,
-    /// a left-out part is judged about its own mean, as a held-out run is
+struct Fold {
+    /// of all rows, all runs one after the other: the block that a row is judged in, where it is left out
+    block: Vec<Option<usize>>,
+    /// how much a row counts
+    weight: f64,
+    /// what is left out is judged about its own mean, as a held-out run is
     about_mean: bool,
 }
 
+/// What is left out in turn.
+#[derive(Debug, Clone)]
+pub(crate) struct Folds {
+    left_out: Vec<Fold>,
+    /// blocks in all
+    blocks: usize,
+}
+
 impl Folds {
-    /// Whole runs where three or more cover the period; fifths in time where one run repeats it; fifths of the way where a part of
-    /// the period has no row and the model is asked for the angle there, at a reference of `asked`; else interleaved blocks.
+    /// Whole runs where three or more cover the period; fifths in time where one run repeats it; else interleaved blocks, and, where a
+    /// part of the period has no row and the model is asked for the angle there, at a reference of `asked`, fifths of the way: each counts
+    /// as much as is asked for where rows are, and where they are not.
     pub(crate) fn of(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> Self {
         let periods: Vec<f64> = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU).collect();
         let least = periods.iter().copied().fold(f64::INFINITY, f64::min);
-        let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
-        let whole = runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS;
-        let fifths = runs.len() == 1 && least > PERIODS_OF_ONE;
-        if !whole && !fifths && lacks_a_part(runs, asked, cycles_per_rad) {
-            return Self { about_mean: true, ..Self::of_the_way(runs) };
+        if runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS {
+            return Self::leaving(runs, true, |number, _, _| (number, 0), |_| 1);
         }
-        for (number, run) in runs.iter().enumerate() {
-            let n = run.len();
-            let width = (n / INTERLEAVED_BLOCKS).max(1);
-            for i in 0..n {
-                let (f, b) = if whole {
-                    (number, 0)
-                } else if fifths {
-                    (i * FOLDS / n, i * CONTIGUOUS_BLOCKS / n)
-                } else {
-                    (i / width % FOLDS, i / width)
-                };
-                fold.push(f);
-                block.push(blocks + b);
-            }
-            blocks = block.last().map_or(0, |b| b + 1);
+        if runs.len() == 1 && least > PERIODS_OF_ONE {
+            let part = |i: usize, parts: usize, rows: usize| i * parts / rows;
+            return Self::leaving(
+                runs,
+                true,
+                |_, i, rows| (part(i, FOLDS, rows), part(i, CONTIGUOUS_BLOCKS, rows)),
+                |_| CONTIGUOUS_BLOCKS,
+            );
         }
-        let count = fold.iter().max().map_or(0, |f| f + 1);
-        Self { fold, block, count, blocks, about_mean: whole || fifths }
+        let far = share_asked_in_the_gap(runs, asked, cycles_per_rad);
+        let of_the_way = || Self::of_the_way(runs).about_means();
+        match far {
+            0.0 => Self::interleaved(runs),
+            1.0 => of_the_way(),
+            far => Self::interleaved(runs).weighing(1.0 - far).and(of_the_way().weighing(far)),
+        }
     }
 
     /// Interleaved blocks of every run.
     pub(crate) fn interleaved(runs: &[SensorRun]) -> Self {
-        let (mut fold, mut block, mut blocks) = (Vec::new(), Vec::new(), 0);
-        for run in runs {
-            let width = (run.len() / INTERLEAVED_BLOCKS).max(1);
-            fold.extend((0..run.len()).map(|i| i / width % FOLDS));
-            block.extend((0..run.len()).map(|i| blocks + i / width));
-            blocks = block.last().map_or(0, |b| b + 1);
-        }
-        let count = fold.iter().max().map_or(0, |f| f + 1);
-        Self { fold, block, count, blocks, about_mean: false }
+        let width = |rows: usize| (rows / INTERLEAVED_BLOCKS).max(1);
+        Self::leaving(
+            runs,
+            false,
+            |_, i, rows| (i / width(rows) % FOLDS, i / width(rows)),
+            |rows| rows.div_ceil(width(rows)),
+        )
     }
 
     /// Fifths of the way that every run turns: rests, however long, are places.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below CONTIGUOUS_BLOCKS")]
     pub(crate) fn of_the_way(runs: &[SensorRun]) -> Self {
-        let mut block = Vec::new();
+        let gone: Vec<Vec<f64>> = runs
+            .iter()
+            .map(|run| {
+                let way = run.path_rad().max(f64::MIN_POSITIVE);
+                let steps = run.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs());
+                std::iter::once(0.0)
+                    .chain(steps)
+                    .scan(0.0, |gone, step| {
+                        *gone += step;
+                        Some(*gone / way)
+                    })
+                    .collect()
+            })
+            .collect();
+        let part = |share: f64| ((CONTIGUOUS_BLOCKS as f64 * share) as usize).min(CONTIGUOUS_BLOCKS - 1);
+        Self::leaving(
+            runs,
+            false,
+            |number, i, _| (part(gone[number][i]) * FOLDS / CONTIGUOUS_BLOCKS, part(gone[number][i])),
+            |_| CONTIGUOUS_BLOCKS,
+        )
+    }
+
+    /// Folds of which each row belongs to one: `place` says to which, and to which block of its run's, by the run's number, the row's and
+    /// how many rows it has; `blocks` how many blocks a run of so many rows has.
+    fn leaving(
+        runs: &[SensorRun],
+        about_mean: bool,
+        place: impl Fn(usize, usize, usize) -> (usize, usize),
+        blocks: impl Fn(usize) -> usize,
+    ) -> Self {
+        let mut first = 0;
+        let mut places = Vec::new();
         for (number, run) in runs.iter().enumerate() {
-            let way = run.path_rad().max(f64::MIN_POSITIVE);
-            let steps = run.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs());
-            let gone = std::iter::once(0.0).chain(steps).scan(0.0, |gone, step| {
-                *gone += step;
-                Some(*gone / way)
-            });
-            let part = |share: f64| ((CONTIGUOUS_BLOCKS as f64 * share) as usize).min(CONTIGUOUS_BLOCKS - 1);
-            block.extend(gone.map(|share| number * CONTIGUOUS_BLOCKS + part(share)));
+            let of_row = |i| {
+                let (fold, block) = place(number, i, run.len());
+                (fold, first + block)
+            };
+            places.extend((0..run.len()).map(of_row));
+            first += blocks(run.len());
         }
-        let fold = block.iter().map(|b| b % CONTIGUOUS_BLOCKS * FOLDS / CONTIGUOUS_BLOCKS).collect();
-        Self { fold, block, count: FOLDS, blocks: CONTIGUOUS_BLOCKS * runs.len(), about_mean: false }
+        let count = places.iter().map(|(fold, _)| fold + 1).max().unwrap_or(0);
+        let fold = |number| Fold {
+            block: places.iter().map(|(fold, block)| (*fold == number).then_some(*block)).collect(),
+            weight: 1.0,
+            about_mean,
+        };
+        Self { left_out: (0..count).map(fold).collect(), blocks: first }
+    }
+
+    fn about_means(mut self) -> Self {
+        self.left_out.iter_mut().for_each(|fold| fold.about_mean = true);
+        self
+    }
+
+    fn weighing(mut self, weight: f64) -> Self {
+        self.left_out.iter_mut().for_each(|fold| fold.weight *= weight);
+        self
+    }
+
+    fn and(mut self, mut other: Self) -> Self {
+        other.left_out.iter_mut().flat_map(|fold| &mut fold.block).flatten().for_each(|block| *block += self.blocks);
+        self.left_out.extend(other.left_out);
+        self.blocks += other.blocks;
+        self
+    }
+
+    /// How often something is left out.
+    pub(crate) fn count(&self) -> usize {
+        self.left_out.len()
+    }
+
+    /// Whether a row, counted over all runs, is left out with a fold.
+    pub(crate) fn leaves_out(&self, fold: usize, row: usize) -> bool {
+        self.left_out[fold].block[row].is_some()
     }
 
     /// What a simpler model may be worse by: less where blocks are interleaved, and then as much as elsewhere if what is
     /// chosen so does not stand.
     pub(crate) fn tolerances(&self) -> &'static [Tolerance] {
-        if self.about_mean { &[Tolerance::One] } else { &[Tolerance::Half, Tolerance::One] }
+        if self.left_out.iter().all(|fold| fold.about_mean) {
+            &[Tolerance::One]
+        } else {
+            &[Tolerance::Half, Tolerance::One]
+        }
     }
 
     /// The runs without the rows of a fold.
@@ -141,7 +206,7 @@ impl Folds {
         let mut first = 0;
         runs.iter()
             .map(|r| {
-                let rows: Vec<usize> = (0..r.len()).filter(|i| self.fold[first + i] != fold).collect();
+                let rows: Vec<usize> = (0..r.len()).filter(|i| !self.leaves_out(fold, first + i)).collect();
                 first += r.len();
                 r.subset(&rows)
             })
@@ -149,12 +214,13 @@ impl Folds {
     }
 }
 
-/// Whether one part of the period has no row, and some of what is asked for lies in it, as where the last quarter of a turn is held out.
-fn lacks_a_part(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> bool {
+/// The share of what is asked for that lies in the one part of the period without a row, as where the last quarter of a turn is held
+/// out; 0 where there is no such part or next to nothing is asked for there.
+fn share_asked_in_the_gap(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> f64 {
     let place = |a: &f64| (a * cycles_per_rad / std::f64::consts::TAU).rem_euclid(1.0);
     let mut places: Vec<f64> = runs.iter().flat_map(|r| r.reference_rad.iter().map(place)).collect();
     places.sort_by(f64::total_cmp);
-    let Some((first, last)) = places.first().copied().zip(places.last().copied()) else { return false };
+    let Some((first, last)) = places.first().copied().zip(places.last().copied()) else { return 0.0 };
     let ends = places.windows(2).map(|w| [w[0], w[1]]).chain([[last, 1.0 + first]]);
     let mut gaps: Vec<[f64; 2]> = ends.collect();
     gaps.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
@@ -162,21 +228,22 @@ fn lacks_a_part(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> bool 
     let next = gaps.get(1).map_or(0.0, |g| g[1] - g[0]);
     // rows that are held out among those that are fitted stand at its very edge at most
     let within = |a: &&f64| (EDGE..width - EDGE).contains(&(place(a) - from).rem_euclid(1.0));
-    let is_asked = asked.iter().filter(within).count() as f64 >= ASKED * asked.len() as f64 && !asked.is_empty();
-    GAP.contains(&width) && width > ALONE * next && is_asked
+    let share = asked.iter().filter(within).count() as f64 / asked.len().max(1) as f64;
+    if GAP.contains(&width) && width > ALONE * next && share >= ASKED { share } else { 0.0 }
 }
 
 /// Squared errors of left-out rows, by block.
 #[derive(Debug, Clone)]
 pub(crate) struct Losses {
     sum: Vec<f64>,
-    rows: usize,
+    /// by their weights
+    rows: f64,
 }
 
 impl Losses {
     /// Root of the mean square.
     pub(crate) fn rms(&self) -> f64 {
-        (self.total() / self.rows.max(1) as f64).sqrt()
+        (self.total() / self.rows.max(f64::MIN_POSITIVE)).sqrt()
     }
 
     fn total(&self) -> f64 {
@@ -222,16 +289,15 @@ pub(crate) fn cross_validate<'a>(
     runs: usize,
     cycles: f64,
 ) -> Option<Losses> {
-    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0 };
-    for left_out in 0..folds.count {
-        let samples = samples_without(left_out)?;
+    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0.0 };
+    for (number, left_out) in folds.left_out.iter().enumerate() {
+        let samples = samples_without(number)?;
         let train: Vec<Sample> =
-            samples.iter().zip(&folds.fold).filter(|(_, f)| **f != left_out).map(|(s, _)| *s).collect();
+            samples.iter().zip(&left_out.block).filter(|(_, out)| out.is_none()).map(|(s, _)| *s).collect();
         let fitted = TableFit::new(shape, &train, runs, cycles)?;
-        let test: Vec<(f64, usize, usize)> = (0..samples.len())
-            .filter(|&i| folds.fold[i] == left_out)
-            .map(|i| (fitted.left(&samples[i]), samples[i].run, folds.block[i]))
-            .collect();
+        let judged = samples.iter().zip(&left_out.block);
+        let test: Vec<(f64, usize, usize)> =
+            judged.filter_map(|(s, block)| Some((fitted.left(s), s.run, (*block)?))).collect();
         let mut mean = vec![(0.0, 0usize); runs];
         for (left, run, _) in &test {
             mean[*run].0 += left;
@@ -239,11 +305,11 @@ pub(crate) fn cross_validate<'a>(
         }
         for (left, run, block) in test {
             let constant = match fitted.constants[run] {
-                Some(c) if !folds.about_mean => c,
+                Some(c) if !left_out.about_mean => c,
                 _ => mean[run].0 / mean[run].1 as f64,
             };
-            losses.sum[block] += (left - constant).powi(2);
-            losses.rows += 1;
+            losses.sum[block] += left_out.weight * (left - constant).powi(2);
+            losses.rows += left_out.weight;
         }
     }
     losses.sum.iter().all(|v| v.is_finite()).then_some(losses)
@@ -256,14 +322,14 @@ pub(crate) fn losses_of_radius(
     runs: &[SensorRun],
 ) -> Option<Losses> {
     let readings: Vec<[f64; 2]> = runs.iter().filter_map(SensorRun::channels).flatten().copied().collect();
-    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0 };
-    for left_out in 0..folds.count {
-        let readout = readout_without(left_out)?;
-        let rows = readings.iter().zip(&folds.fold).zip(&folds.block).filter(|((z, _), _)| !readout.rails.clips(**z));
-        for ((z, _), block) in rows.filter(|((_, f), _)| **f == left_out) {
+    let mut losses = Losses { sum: vec![0.0; folds.blocks], rows: 0.0 };
+    for (number, left_out) in folds.left_out.iter().enumerate() {
+        let readout = readout_without(number)?;
+        let judged = readings.iter().zip(&left_out.block).filter_map(|(z, block)| Some((z, (*block)?)));
+        for (z, block) in judged.filter(|(z, _)| !readout.rails.clips(**z)) {
             let [x, y] = readout.undo(*z);
-            losses.sum[*block] += (x.hypot(y) / readout.radius + f64::MIN_POSITIVE).ln().powi(2);
-            losses.rows += 1;
+            losses.sum[block] += left_out.weight * (x.hypot(y) / readout.radius + f64::MIN_POSITIVE).ln().powi(2);
+            losses.rows += left_out.weight;
         }
     }
     losses.sum.iter().all(|v| v.is_finite()).then_some(losses)
@@ -319,7 +385,7 @@ mod tests {
     use super::*;
 
     fn candidate(size: usize, model: &'static str, sum: [f64; 4]) -> Candidate<&'static str> {
-        Candidate { size, texts: 0, model, losses: Losses { sum: sum.to_vec(), rows: 4 }, of_radius: None }
+        Candidate { size, texts: 0, model, losses: Losses { sum: sum.to_vec(), rows: 4.0 }, of_radius: None }
     }
 
     #[test]
@@ -350,7 +416,7 @@ mod tests {
             candidate(5, "cubic", [1.0, 1.1, 1.04, 1.0]),
         ];
         for (c, radius) in candidates.iter_mut().zip([9.0, 4.0, 1.1, 1.1]) {
-            c.of_radius = Some(Losses { sum: vec![radius, radius * 1.1, radius * 0.9, radius], rows: 4 });
+            c.of_radius = Some(Losses { sum: vec![radius, radius * 1.1, radius * 0.9, radius], rows: 4.0 });
         }
         assert_eq!(choose(&candidates, Tolerance::One).map(|c| c.model), Some("affine"));
     }

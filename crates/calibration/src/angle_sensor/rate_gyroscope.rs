@@ -73,13 +73,13 @@ pub(super) fn estimates(all: &[Stretch], splits: &[Split], terms: &[Term], law: 
 
 /// Sum of squares of interleaved blocks that were left out in turn, rad².
 pub(super) fn left_out_in_turn(stretches: &[Stretch], folds: &Folds, terms: &[Term]) -> f64 {
-    let rows: Vec<(Row, usize)> = rows(stretches, terms).into_iter().zip(folds.fold.iter().copied()).collect();
+    let rows: Vec<(usize, Row)> = rows(stretches, terms).into_iter().enumerate().collect();
     let square_of = |out: usize| {
-        let values = solved(rows.iter().filter(|r| r.1 != out).map(|r| &r.0), terms.len());
+        let values = solved(rows.iter().filter(|r| !folds.leaves_out(out, r.0)).map(|r| &r.1), terms.len());
         let left = |(row, error): &Row| error - row.iter().zip(&values).map(|(a, b)| a * b).sum::<f64>();
-        rows.iter().filter(|r| r.1 == out).map(|r| left(&r.0).powi(2)).sum::<f64>()
+        rows.iter().filter(|r| folds.leaves_out(out, r.0)).map(|r| left(&r.1).powi(2)).sum::<f64>()
     };
-    (0..folds.count).map(square_of).sum()
+    (0..folds.count()).map(square_of).sum()
 }
 
 /// A scale factor is told from a bias.

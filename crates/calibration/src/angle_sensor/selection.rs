@@ -160,7 +160,7 @@ impl<'a> Selection<'a> {
     pub(crate) fn across_gaps(&self, (front, chosen): &Model) -> Option<(Shape, Losses)> {
         let folds = Folds::of_the_way(&self.runs);
         let samples = |readout: Option<&Readout>| self.sensor.samples(&self.runs, readout);
-        let without: Vec<Vec<Sample>> = (0..folds.count)
+        let without: Vec<Vec<Sample>> = (0..folds.count())
             .map(|fold| match front {
                 None => Some(samples(None)),
                 Some((Kind::Plain, ..)) => Some(samples(Some(&Readout::plain()))),
@@ -403,7 +403,7 @@ impl<'a> Selection<'a> {
         if !circle::shows(&whole, &self.runs) {
             return None;
         }
-        let readouts: Vec<Readout> = (0..self.folds.count)
+        let readouts: Vec<Readout> = (0..self.folds.count())
             .map(|fold| {
                 let kept = self.folds.without(&self.runs, fold);
                 fit(kind, weighting, &kept, self.sensor.gain, &whole).map(|f| f.readout)
