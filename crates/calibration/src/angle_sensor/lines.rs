@@ -18,6 +18,10 @@ const ORDINATES_TIMES_ROWS: usize = 2_000_000;
 const FEWEST: usize = 8;
 /// The first harmonics of the sensor's period are left to the table, even where it was chosen shorter.
 const OF_EVERY_TABLE: usize = 4;
+/// Of less than a whole turn, so much must be covered, and so many periods of a line: fewer are a drift as well.
+const WHOLE_TURN: f64 = 350.0 / 360.0 * std::f64::consts::TAU;
+const LEAST_SPAN: f64 = std::f64::consts::TAU / 3.0;
+const FEWEST_PERIODS: f64 = 6.0;
 /// Lines that are nearer than this, per turn, are one.
 const ONE_LINE: f64 = 0.25;
 /// The strongest line may be the alias of one that has this share of its power, and this coherence with it on the stations.
@@ -43,15 +47,17 @@ const TURNS_OF_A_SLOW_LINE: f64 = 1.75;
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small positive counts, saturating")]
 pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, cycles_per_turn: f64) -> Vec<u32> {
     let reference: Vec<f64> = samples.iter().map(|s| s.reference).collect();
-    if span(&reference) < 350f64.to_radians() {
+    let (covered, whole) = (span(&reference), cover_a_turn(samples));
+    if covered < LEAST_SPAN {
         return Vec::new();
     }
     let left: Vec<f64> = samples.iter().map(|s| fitted.left(s) - fitted.constants[s.run].unwrap_or(0.0)).collect();
     let resolved = std::f64::consts::PI / spacing(&reference).max(1e-12) + 0.01;
-    let repeats = span(&reference) > TURNS_OF_A_SLOW_LINE * std::f64::consts::TAU;
+    let repeats = covered > TURNS_OF_A_SLOW_LINE * std::f64::consts::TAU;
+    let slowest = if whole { 0.0 } else { FEWEST_PERIODS * std::f64::consts::TAU / covered };
     let highest = highest(reference.len());
     let tried: Vec<u32> = (1..=highest.min(resolved as u32))
-        .filter(|n| !fitted.shape.lines.contains(n))
+        .filter(|n| !fitted.shape.lines.contains(n) && f64::from(*n) > slowest)
         .filter(|n| repeats || f64::from(*n) > cycles_per_turn)
         .filter(|n| !belongs_to_table(*n, fitted.shape.order, cycles_per_turn))
         .collect();
@@ -78,6 +84,11 @@ pub(crate) fn strongest_and_its_aliases(samples: &[Sample], fitted: &TableFit, c
     ranked.extend(beyond.map(|n| (n, power(f64::from(n), &reference, &left))));
     let aliases = ranked.into_iter().filter(|a| a.1 > ALIAS * first.1 && coherence(first.0, a.0, &reference) > ALIAS);
     aliases.take(MOST_ALIASES).map(|(n, _)| n).collect()
+}
+
+/// Whether samples cover a turn of the reference.
+pub(crate) fn cover_a_turn(samples: &[Sample]) -> bool {
+    span(&samples.iter().map(|s| s.reference).collect::<Vec<_>>()) > WHOLE_TURN
 }
 
 /// Coherence of two lines on the stations: 1 where one is the alias of the other, near 0 where both are resolved.

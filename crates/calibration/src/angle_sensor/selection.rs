@@ -11,7 +11,7 @@ use super::cross_validation::{
     Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, losses_of_radius,
 };
 use super::ellipse;
-use super::lines::{is_harmonic_of_table, strongest_and_its_aliases};
+use super::lines::{cover_a_turn, is_harmonic_of_table, strongest_and_its_aliases};
 use super::rails::Rails;
 use super::readout::{Kind, Readout, unknowns_of_texts};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
@@ -448,7 +448,9 @@ impl<'a> Selection<'a> {
         with.sort_by(|a, b| a.losses.rms().total_cmp(&b.losses.rms()));
         let (best, aliases) = with.split_first()?;
         let distinct = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
-        (best.losses.is_better_than(&chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
+        // over a part of a turn a line stands in for a harmonic more of the table
+        let helps = if cover_a_turn(&samples) { Losses::is_better_than } else { Losses::is_distinct_from };
+        (helps(&best.losses, &chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
     }
 }
 
