@@ -2,6 +2,7 @@
 //! that neighbours of a row do not betray it (Burman, Chow and Nolan 1994; Roberts et al. 2017), and the simplest model
 //! within a standard error of the best, or half of one, is taken, the errors paired over blocks (Breiman et al. 1984).
 
+use super::gap::Gap;
 use super::readout::Readout;
 use super::samples::SensorRun;
 use super::table_fit::{Sample, Shape, TableFit};
@@ -13,11 +14,9 @@ const CONTIGUOUS_BLOCKS: usize = 20;
 /// Periods that each run has to cover for whole runs to be left out, and one run for contiguous fifths.
 const PERIODS_OF_RUNS: f64 = 0.9;
 const PERIODS_OF_ONE: f64 = 1.75;
-/// A part of the period without a row that rows beside it do not bridge, where it is wider than any other by this factor: the last quarter
-/// of a turn that is held out is a fourth, and stations are as far apart everywhere. A sensor that turns through half a turn only is not
-/// asked for the other half. Engineering choices.
-const GAP: std::ops::Range<f64> = 0.15..0.4;
-const ALONE: f64 = 2.0;
+/// The part of the period without a row of which it matters that something is asked for there is no wider than this share of it: a sensor
+/// that turns through half a turn only is not asked for the other half. Engineering choice.
+const WIDEST_GAP: f64 = 0.4;
 /// The share of what is asked for that lies in such a part, and how far from its edges, as a share of the period. Engineering choices.
 const ASKED: f64 = 0.1;
 const EDGE: f64 = 0.02;
@@ -217,19 +216,12 @@ impl Folds {
 /// The share of what is asked for that lies in the one part of the period without a row, as where the last quarter of a turn is held
 /// out; 0 where there is no such part or next to nothing is asked for there.
 fn share_asked_in_the_gap(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> f64 {
-    let place = |a: &f64| (a * cycles_per_rad / std::f64::consts::TAU).rem_euclid(1.0);
-    let mut places: Vec<f64> = runs.iter().flat_map(|r| r.reference_rad.iter().map(place)).collect();
-    places.sort_by(f64::total_cmp);
-    let Some((first, last)) = places.first().copied().zip(places.last().copied()) else { return 0.0 };
-    let ends = places.windows(2).map(|w| [w[0], w[1]]).chain([[last, 1.0 + first]]);
-    let mut gaps: Vec<[f64; 2]> = ends.collect();
-    gaps.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
-    let [from, width] = [gaps[0][0], gaps[0][1] - gaps[0][0]];
-    let next = gaps.get(1).map_or(0.0, |g| g[1] - g[0]);
+    let angles = runs.iter().flat_map(|r| r.reference_rad.iter().copied());
+    let Some(gap) = Gap::of(angles, cycles_per_rad).filter(|gap| gap.width < WIDEST_GAP) else { return 0.0 };
     // rows that are held out among those that are fitted stand at its very edge at most
-    let within = |a: &&f64| (EDGE..width - EDGE).contains(&(place(a) - from).rem_euclid(1.0));
-    let share = asked.iter().filter(within).count() as f64 / asked.len().max(1) as f64;
-    if GAP.contains(&width) && width > ALONE * next && share >= ASKED { share } else { 0.0 }
+    let within = asked.iter().filter(|a| gap.holds(**a, cycles_per_rad, EDGE)).count();
+    let share = within as f64 / asked.len().max(1) as f64;
+    if share >= ASKED { share } else { 0.0 }
 }
 
 /// Squared errors of left-out rows, by block.

@@ -9,6 +9,7 @@ pub(crate) mod curve;
 mod deviations;
 mod effects;
 mod ellipse;
+mod gap;
 mod identify;
 mod jumps;
 pub(crate) mod likeness;

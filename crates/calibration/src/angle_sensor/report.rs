@@ -1,10 +1,14 @@
 //! The report of a sensor or a rate gyroscope: the held-out error at each stage, what is left, and the facts of what was
 //! found, in the form that all instruments share.
 
+use cvg_model::Envelope;
+use cvg_model::effects::Moment;
+
 use super::curve::Curve;
+use super::gap::Gap;
 use super::rate_alone::Alone;
 use super::readout::Readout;
-use super::samples::SensorRun;
+use super::samples::{Reading, SensorRun};
 use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
@@ -90,15 +94,28 @@ impl Head {
         }
     }
 
-    fn calibration(self, hypothesis: Hypothesis) -> Calibration {
+    fn calibration(self, hypothesis: Hypothesis, fitted: &[SensorRun]) -> Calibration {
         let provenance = Provenance {
             tool: Some(Tool::default()),
             inputs: self.inputs,
             amplitude_v: self.amplitude_v,
             readout_unit: self.readout_unit,
+            covered_deg: covered_deg(&hypothesis, fitted),
         };
         Calibration { device: self.device, hypothesis, provenance }
     }
+}
+
+/// Where in the sensor's period rows stood that a table was made of, from and to, deg of its own angle; `None` where that is all of it.
+fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<[f64; 2]> {
+    hypothesis.angle_table.as_ref()?;
+    let read = |x, y| hypothesis.bearing(&hypothesis.unread(Envelope::new(x, 0.0, y, 0.0), &Moment::default()));
+    let angles = fitted.iter().flat_map(|run| match &run.reading {
+        Reading::Angle(theta) => theta.clone(),
+        Reading::Channels(channels) => channels.iter().map(|[x, y]| read(*x, *y)).collect(),
+    });
+    let covered = Gap::of(angles, std::f64::consts::TAU / hypothesis.period_rad)?.covered();
+    Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
 }
 
 /// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
@@ -242,7 +259,7 @@ pub(crate) fn report(
         fitted_rms_deg: errors.on_fit.size().rms_deg,
     };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
-    let calibration = head.calibration(hypothesis);
+    let calibration = head.calibration(hypothesis, fitted);
     if !neutral {
         gate::pass(&report, &calibration, facts)?;
     }

@@ -46,6 +46,8 @@ const SOUND: f64 = 0.3;
 /// at a few positions and moves between them, the few rows that moved would be damaged beside all those that rested.
 const DIRECTIONS: usize = 100;
 const MOST_DIRECTIONS_LOST: f64 = 0.1;
+/// A row further off than this many usual steps of the reference is not beside: between them the angle goes its own way.
+const NEAR_STEPS: f64 = 3.0;
 /// An angle leaps where the reference goes on in steps, of the angle, below this, rad.
 const LARGEST_STEP: f64 = 0.125 * TAU;
 
@@ -168,7 +170,7 @@ fn leaps(run: &SensorRun, channels: &[[f64; 2]], ellipse: &Readout, damaged: &[b
     alone(&off, &reference, &far).into_iter().map(|i| rows[i]).collect()
 }
 
-/// By how much the angle of each row is off that row beside it whose angle goes best with its own, and what it is off its reference;
+/// By how much the angle of each row is off that row beside it whose angle goes best with its own, 0 where none is near, and what it is off its reference;
 /// `None` where the reference stands still, or goes on in steps so large that it does not tell where an angle is.
 fn leap_of_each(theta: &[f64], reference: &[f64], period: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     if span(reference) <= 0.0 {
@@ -177,12 +179,18 @@ fn leap_of_each(theta: &[f64], reference: &[f64], period: f64) -> Option<(Vec<f6
     let theta = unwrapped(theta.iter().copied(), period);
     let (gain, _) = line(reference, &theta);
     let mut steps: Vec<f64> = reference.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
-    if median(&mut steps) > LARGEST_STEP * period / TAU {
+    let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
+    let usual = median(&mut steps);
+    if usual > LARGEST_STEP * period / TAU {
         return None;
     }
     let error: Vec<f64> = theta.iter().zip(reference).map(|(t, a)| t - gain * a).collect();
     let apart = |i: usize, j: usize| wrapped(error[i] - error[j], period).abs();
-    let leap = |i: usize| beside(i, error.len()).map(|j| apart(i, j)).fold(f64::INFINITY, f64::min);
+    let is_near = |i: usize, j: usize| (gain * (reference[i] - reference[j])).abs() <= NEAR_STEPS * usual.max(mean);
+    let leap = |i: usize| {
+        let near = beside(i, error.len()).filter(|j| is_near(i, *j));
+        near.map(|j| apart(i, j)).min_by(f64::total_cmp).unwrap_or(0.0)
+    };
     Some(((0..error.len()).map(leap).collect(), error))
 }
 
@@ -302,6 +310,17 @@ mod tests {
         assert_eq!(left(&of(&[])), (0, vec![]));
         let (lost, warnings) = left(&of(&[17, 90, 160]));
         assert!(lost == 3 && warnings[0].contains("off their reference"), "{lost}: {warnings:?}");
+    }
+
+    #[test]
+    fn a_row_behind_a_gap_is_no_damage() {
+        let mut encoder = run(61, |_, a| ellipse(a));
+        // every third of 200 stations, and one at the end of the turn
+        let station = |i: usize| if i == 60 { 199.0 } else { 3.0 * i as f64 };
+        encoder.reference_rad = (0..61).map(|i| TAU * station(i) / 200.0).collect();
+        let error = |a: f64| 0.01 * a.cos() + 2e-5 * (40.0 * a).sin();
+        encoder.reading = Reading::Angle(encoder.reference_rad.iter().map(|a| a + error(*a)).collect());
+        assert_eq!(left(&encoder), (0, vec![]));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The fit of a table, and beside it of how the angle follows motion and of isolated lines of the reference.
 
+use super::gap::Gap;
 use super::readout_fit::centre;
 use crate::model::angle_table::{AngleTable, Form};
 use crate::numerics::linear::NormalEquations;
@@ -142,14 +143,16 @@ pub(crate) fn only_phase(n: f64, samples: &[Sample]) -> Option<[f64; 2]> {
 }
 
 impl TableFit {
-    /// Fits the shape to samples of `runs` runs; `None` where the forward form has no inverse. Coefficients that come out larger than
-    /// errors of this scatter can have are fitted anew, each believed to be no larger (ridge regression, Hoerl and Kennard 1970, with the
-    /// ratio of the variances of noise and errors).
+    /// Fits the shape to samples of `runs` runs; `None` where the forward form has no inverse. Where a part of the period has no row, or
+    /// coefficients come out larger than errors of this scatter can have, they are fitted anew, those of harmonic n each believed to be no
+    /// larger than a share 1/n of the scatter (ridge regression, Hoerl and Kennard 1970, with the ratio of the variances of noise and
+    /// errors): harmonics that all but cancel where rows are would be anything elsewhere.
     pub(crate) fn new(shape: &Shape, samples: &[Sample], runs: usize, cycles: f64) -> Option<Self> {
         let free = Self::believing(shape, samples, runs, cycles, 0.0)?;
         let scatter = root_mean_square(&by_run(samples, runs, |s| s.error).concat());
         let largest = free.table.cos.iter().chain(&free.table.sin).fold(0.0, |m: f64, c| m.max(c.abs()));
-        if largest <= LARGEST_COEFFICIENT * scatter {
+        let lacks_a_part = shape.order > 1 && Gap::of(samples.iter().map(|s| s.theta), cycles).is_some();
+        if !lacks_a_part && largest <= LARGEST_COEFFICIENT * scatter {
             return Some(free);
         }
         let left: f64 = samples.iter().filter_map(|s| Some((free.left(s) - free.constants[s.run]?).powi(2))).sum();
@@ -158,7 +161,7 @@ impl TableFit {
         Self::believing(shape, samples, runs, cycles, share)
     }
 
-    /// The fit where each coefficient is believed to be nothing, as much as one row is believed `noise` times.
+    /// The fit where each coefficient of harmonic n is believed to be nothing, as much as one row is believed n times `noise`.
     fn believing(shape: &Shape, samples: &[Sample], runs: usize, cycles: f64, noise: f64) -> Option<Self> {
         let mut column = vec![None; runs];
         let mut present = 0;
@@ -197,11 +200,12 @@ impl TableFit {
                 push_harmonics(cycles * at, order, &mut row);
                 equations.add(&row, s.error - moved - value);
             }
-            for at in (present + side..x.len()).filter(|_| noise > 0.0) {
+            for (of_series, at) in (present + side..x.len()).enumerate().filter(|_| noise > 0.0) {
+                let belief = noise * (of_series / 2 + 1) as f64;
                 row.clear();
                 row.resize(x.len(), 0.0);
-                row[at] = noise;
-                equations.add(&row, -noise * x[at]);
+                row[at] = belief;
+                equations.add(&row, -belief * x[at]);
             }
             let step = equations.solve();
             for (a, b) in x.iter_mut().zip(&step) {

@@ -164,7 +164,7 @@ impl Found {
 
     fn calibration(&self, report: &Report, amplitude_v: Option<[f64; 2]>) -> Calibration {
         let (tool, inputs) = (Some(Tool::default()), report.inputs.clone());
-        let provenance = Provenance { tool, inputs, amplitude_v, readout_unit: None };
+        let provenance = Provenance { tool, inputs, amplitude_v, ..Provenance::default() };
         let mut hypothesis = self.fitted.fit.hypothesis.clone();
         // what drives can't put out is not undone
         hypothesis.members.retain(|m| m.id != EffectId::DriveSaturation);

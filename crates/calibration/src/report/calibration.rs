@@ -54,6 +54,9 @@ pub struct Provenance {
     pub amplitude_v: Option<[f64; 2]>,
     /// unit of the readout, where it is not V: what is said in V is in it
     pub readout_unit: Option<String>,
+    /// where in the sensor's period the rows stood that a table was made of, from and to, deg of its own angle; none where that is all of
+    /// it, or there is no table
+    pub covered_deg: Option<[f64; 2]>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -75,6 +78,8 @@ struct File {
     amplitude_v: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     readout_unit: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    covered_deg: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     temperature_c: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -142,6 +147,7 @@ impl Calibration {
             rate_bias_per_k_rad_s: h.rate_bias_per_k_rad_s,
             amplitude_v: self.provenance.amplitude_v,
             readout_unit: self.provenance.readout_unit.clone(),
+            covered_deg: self.provenance.covered_deg,
             temperature_c: h.reference_c,
             tool: self.provenance.tool.clone(),
             input: self.provenance.inputs.clone(),
@@ -212,6 +218,7 @@ impl Calibration {
             inputs: file.input,
             amplitude_v: file.amplitude_v,
             readout_unit: file.readout_unit,
+            covered_deg: file.covered_deg,
         };
         Ok(Self { device: file.device, hypothesis, provenance })
     }

@@ -22,6 +22,8 @@ const OUTSIDE: f64 = 1.2;
 /// The rate of a sensor's own angle is that over so many times what it is late by: noise of the angle then adds a tenth of itself.
 const LATENCIES: f64 = 14.0;
 /// Units that are taken for volts, and what they are called.
+/// A row is beyond the part of the period that was covered from so much of the period on.
+const EDGE: f64 = 0.02;
 const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3, "kilovolts")];
 
 /// Compensates a recording.
@@ -112,6 +114,9 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     if let Some(said) = counts_the_other_way(h, recording, &rows) {
         out.warnings.push(format!("{}: {said}", recording.source.display()));
     }
+    if let Some(said) = beyond_the_covered(calibration, &rows) {
+        out.warnings.push(format!("{}: {said}", recording.source.display()));
+    }
     if channels && recording.theta_deg.is_none() {
         let mut last = angle_rad.first().copied().unwrap_or(0.0);
         out.theta_deg = Some(
@@ -150,6 +155,26 @@ pub fn outside(calibration: &Calibration, recording: &Recording) -> Option<Strin
     let within = (low / OUTSIDE..=high * OUTSIDE).contains(&here);
     (!within).then(|| {
         format!("its amplitude is {here:.4e}, the calibration was made from {low:.4e} to {high:.4e}: what goes with the amplitude is extrapolated")
+    })
+}
+
+/// What rows are worth that stand where no row stood that the table was made of, in words; none where there are none.
+fn beyond_the_covered(calibration: &Calibration, rows: &[Row]) -> Option<String> {
+    let [from, to] = calibration.provenance.covered_deg?;
+    let period = calibration.hypothesis.period_rad.to_degrees();
+    let edge = EDGE * period;
+    let is_beyond = |row: &&Row| {
+        let place = (row.angle_rad[1].to_degrees() - from).rem_euclid(period);
+        (to - from + edge..period - edge).contains(&place)
+    };
+    let beyond = rows.iter().filter(is_beyond).count();
+    (beyond > 0).then(|| {
+        format!(
+            "{beyond} of {} rows stand beyond the part of its turn from {from:.0}° to {:.0}° that the calibration was made of: its table \
+             is extrapolated there",
+            rows.len(),
+            to % period
+        )
     })
 }
 

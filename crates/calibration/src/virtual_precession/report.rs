@@ -243,7 +243,7 @@ impl Finding<'_> {
             tool: Some(Tool::default()),
             inputs: provenance::sums(&provenance::files(campaign)),
             amplitude_v: (high > 0.0).then_some([low, high]),
-            readout_unit: None,
+            ..Provenance::default()
         };
         let calibration = Calibration { device: campaign.device.clone(), hypothesis: h, provenance };
         Calibration::from_text(&calibration.to_text(), "the calibration").map_err(|why| {
