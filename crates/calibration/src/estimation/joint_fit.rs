@@ -18,7 +18,7 @@ use crate::recording::{Campaign, Instrument, Role, RunKind};
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
 pub mod belief {
-    /// 1/τ, 1/s, where commands and ring-downs are missing: time constants of 8 s and more
+    /// 1/τ, 1/s, where nothing tells it: time constants of 8 s and more
     pub const DAMPING_PER_S: f64 = 0.06;
     /// control latency, s
     pub const CONTROL_LATENCY_S: f64 = 2e-3;
@@ -199,6 +199,11 @@ impl Dataset {
         self.command_rms[0].hypot(self.command_rms[1]).max(1e-9)
     }
 
+    /// The force scale with which the energy command replaces the damping that is believed, 1/s; `None` where it was not recorded.
+    fn believed_force_scale(&self) -> Option<f64> {
+        (self.command_rms[0] > 0.0).then(|| belief::DAMPING_PER_S / self.command_rms[0])
+    }
+
     /// How far a parameter may be from its neutral value before the data, as a standard deviation.
     pub(crate) fn believed(&self, parameter: &Parameter) -> Option<f64> {
         match parameter.belief {
@@ -244,7 +249,7 @@ impl Dataset {
         {
             all.push(Prior { considered, ..prior(Unknown::Effect(member, 0), inverse_level, deviation) });
         }
-        let silent = (0.0, belief::FORCING_PER_S / self.commanded());
+        let silent = self.believed_force_scale().map_or((0.0, belief::FORCING_PER_S / self.commanded()), |s| (s, s));
         let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };
         let balance = self.energy_balance.map(|(scale, deviation)| (scale, deviation.max(share * scale)));
         let scale = drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(balance).unwrap_or(silent);
@@ -277,6 +282,10 @@ impl Dataset {
     /// own noise wanders, so this is a belief for the fit of the angle and not a part of it.
     pub(crate) fn balance_energy(&mut self, hypothesis: &mut Hypothesis) {
         self.energy_balance = None;
+        // at none nothing that the drive does has a slope
+        if hypothesis.force_scale <= 0.0 {
+            hypothesis.force_scale = self.believed_force_scale().unwrap_or(0.0);
+        }
         let starts: Vec<_> = self.tracks.iter().map(|p| p.starts.clone()).collect();
         let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };
         let (scale, deviation) = (balance.closed.force_scale, balance.deviation(BALANCE_NOISE));
@@ -536,6 +545,14 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             }
             dataset.weigh_by(&held);
         }
+        let result = if dataset.drive_is_free && result.hypothesis.force_scale <= 0.0 {
+            // the angle does not tell it after all
+            dataset.drive_is_free = false;
+            dataset.balance_energy(&mut hypothesis);
+            dataset.fitted_anew(&hypothesis, drive.as_ref())
+        } else {
+            result
+        };
         let result = if dataset.contradicts_the_balance(&result.hypothesis) {
             dataset.with_the_split_held(&hypothesis, drive.as_ref())
         } else {
