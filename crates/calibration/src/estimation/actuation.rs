@@ -6,7 +6,7 @@
 use cvg_model::ControlOutputs;
 pub use cvg_model::actuation::actuation_gain_ratio;
 use cvg_model::effects::Moment;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::data::track::commanded;
 use crate::error::Refusal;
@@ -350,8 +350,11 @@ fn mean_error(values: &[f64], mean: f64) -> f64 {
     (blocks.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt()
 }
 
+/// A skew of the drives before ring-downs tell it, as a standard deviation.
+const BELIEVED_SKEW: f64 = 1e-2;
+
 /// The two actuation gains (per 2ω, 1/s and V per V) and their covariance, from ring-downs at two or more directions:
-/// the drive's gain in direction θ is G_Ax cos²θ + G_Ay sin²θ = 1/(τ·(−v_as/a)).
+/// the drive's gain in direction θ is 1/(τ·(−v_as/a)).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveGains {
     /// G_Ax/2ω and G_Ay/2ω
@@ -363,25 +366,29 @@ pub struct DriveGains {
 }
 
 impl DriveGains {
-    /// From ring-downs; `None` where their directions do not tell the axes apart.
+    /// From ring-downs; `None` where their directions do not tell the axes apart. The rate loop holds the pattern against what unequal
+    /// and skewed drives make of the energy command, and its force has a part along the pattern too: together they act with
+    /// 1/G(θ) = cos²θ/G_Ax + sin²θ/G_Ay − s_a sin θ cos θ/G_Ay, of which the skew s_a is told by three directions, or believed.
     pub fn from_ring_downs(ring_downs: &[RingDown]) -> Option<Self> {
-        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        let inverse_gain = |r: &RingDown| -r.tau_s * r.drive;
+        let usual = ring_downs.iter().map(inverse_gain).sum::<f64>() / ring_downs.len().max(1) as f64;
+        let believed = Vector3::new(0.0, 0.0, (BELIEVED_SKEW * usual).powi(-2));
+        let (mut normal, mut right) = (Matrix3::from_diagonal(&believed), Vector3::zeros());
         for r in ring_downs {
-            let gain = -1.0 / (r.tau_s * r.drive);
             let relative = (r.tau_error_s / r.tau_s).hypot(r.drive_error / r.drive).max(1e-9);
-            let c2 = r.angle_rad.cos().powi(2);
-            let row = Vector2::new(c2, 1.0 - c2);
-            let weight = 1.0 / (relative * gain).powi(2);
+            let (sin, cos) = r.angle_rad.sin_cos();
+            let row = Vector3::new(cos * cos, sin * sin, -sin * cos);
+            let weight = 1.0 / (relative * inverse_gain(r)).powi(2);
             normal += row * row.transpose() * weight;
-            right += row * gain * weight;
+            right += row * inverse_gain(r) * weight;
         }
         let covariance = normal.try_inverse()?;
-        let g = covariance * right;
-        let (dx, dy) = (covariance[(0, 0)].sqrt() / g[0], covariance[(1, 1)].sqrt() / g[1]);
-        let cross = covariance[(0, 1)] / (g[0] * g[1]);
-        let sound = g[0] > 0.0 && g[1] > 0.0 && dx < 0.3 && dy < 0.3;
+        let inverse = covariance * right;
+        let (dx, dy) = (covariance[(0, 0)].sqrt() / inverse[0], covariance[(1, 1)].sqrt() / inverse[1]);
+        let cross = covariance[(0, 1)] / (inverse[0] * inverse[1]);
+        let sound = inverse[0] > 0.0 && inverse[1] > 0.0 && dx < 0.3 && dy < 0.3;
         sound.then(|| Self {
-            gains: [g[0], g[1]],
+            gains: [1.0 / inverse[0], 1.0 / inverse[1]],
             ratio_error: (dx * dx + dy * dy - 2.0 * cross).max(0.0).sqrt(),
             mean_error: 0.5 * (dx * dx + dy * dy + 2.0 * cross).max(0.0).sqrt(),
         })
