@@ -7,6 +7,7 @@ pub(crate) mod copies;
 pub(crate) mod held_reference;
 pub(crate) mod interpolated;
 pub(crate) mod plausibility;
+pub(crate) mod quadrature_spikes;
 pub(crate) mod rail;
 mod rate_spikes;
 pub(crate) mod references;

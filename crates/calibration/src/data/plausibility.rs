@@ -9,8 +9,8 @@ use crate::data::copies;
 use crate::data::held_reference;
 use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
-use crate::data::rate_spikes;
 use crate::data::references::references;
+use crate::data::{quadrature_spikes, rate_spikes};
 use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording, Run};
 
@@ -58,6 +58,7 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let name = recording.source.display().to_string();
     findings.warnings.extend(held_reference::go_on_evenly(recording));
     rate_spikes::leave_out(recording, &name, &mut findings.warnings);
+    findings.warnings.extend(quadrature_spikes::mend(recording));
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
         Err(broken) => {

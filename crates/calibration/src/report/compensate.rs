@@ -3,6 +3,7 @@
 
 use cvg_model::effects::{EffectId, Stage};
 
+use crate::data::quadrature_spikes;
 use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::propagation::{Start, Stepping, propagate};
@@ -53,19 +54,22 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     let is_by_its_own_rate = rated.is_some();
     needs_no_reference(h, rated.as_ref().unwrap_or(recording))?;
     needs_no_temperature(h, recording)?;
+    let mut read = rated.unwrap_or_else(|| recording.clone());
+    let leaps = quadrature_spikes::mend(&mut read);
     let run = Run {
         kind: RunKind::Rotation,
         file: recording.source.clone(),
         settle_s: 0.0,
         role: Role::Fit,
         amplitude: None,
-        recording: rated.unwrap_or_else(|| recording.clone()),
+        recording: read,
     };
     let mut track = Track::whole(run, h.period_rad)?;
     if let Some(reference_c) = h.reference_c {
         track.refer_to(reference_c);
     }
     let mut out = recording.clone();
+    out.warnings.extend(leaps);
     let mut angle_rad: Vec<f64> = Vec::new();
     let mut rows = Vec::with_capacity(recording.len());
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
