@@ -350,7 +350,8 @@ fn sensor_finding(
              another at those held out: it is not taken off there"
         )
     }));
-    let against = sense.is_some_and(|s| s * model.sensor.gain < 0.0);
+    // a negative one that counts with the reference is k as Equation 1 has it
+    let against = sense.is_some_and(|s| s > 0.0 && model.sensor.gain < 0.0);
     let gain_ratio = all.map(|ratio| if against { or_exchanged(ratio) } else { ratio });
     if against {
         warnings.push(counts_against(gain_ratio));

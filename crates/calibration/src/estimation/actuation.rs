@@ -208,7 +208,10 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     let rate = decayed.rate;
     if rate <= 3.0 * decayed.error {
         return refuse(
-            format!("the amplitude does not decay after energy_off_s (rate {:.3e} 1/s)", -rate),
+            format!(
+                "the amplitude does not decay after energy_off_s: it grows by {:.3e} ± {:.0e} 1/s",
+                -rate, decayed.error
+            ),
             "a ring-down with the energy loop off",
         );
     }

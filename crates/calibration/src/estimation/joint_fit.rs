@@ -5,7 +5,7 @@ use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Sta
 use crate::data::plausibility::{without_commands_in_another_unit, without_dead_command, without_held_commands};
 use crate::data::track::Track;
 use crate::error::Refusal;
-use crate::estimation::actuation::{DriveGains, RingDown, ring_down};
+use crate::estimation::actuation::{DriveGains, RingDown};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
 use crate::estimation::initial_guess::Motion;
@@ -505,8 +505,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
     let mut round = 0;
     loop {
         // the drive first: it multiplies all that the commands do
-        let ring_downs =
-            dataset.ring_down_runs.iter().map(|r| ring_down(r, &hypothesis)).collect::<Result<Vec<_>, _>>()?;
+        let ring_downs = dataset.ring_downs(&hypothesis)?;
         let drive = DriveGains::from_ring_downs(&ring_downs);
         match &drive {
             Some(d) => {

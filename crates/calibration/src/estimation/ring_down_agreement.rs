@@ -43,7 +43,7 @@ impl Dataset {
     /// # Errors
     /// Where a ring-down is not one, or what the rotations take replaces no damping at all.
     pub(crate) fn require_driven_rotations(&self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
-        let all = self.all_ring_downs(hypothesis)?;
+        let all = self.ring_downs(hypothesis)?;
         let undriven = |usual: &f64| all.iter().all(|r| *usual < LEAST_DRIVE * -r.drive);
         let (Some(first), Some(usual)) = (all.first(), self.usual_drive(hypothesis).filter(undriven)) else {
             return Ok(());
@@ -66,7 +66,7 @@ impl Dataset {
     /// # Errors
     /// Where a ring-down is not one.
     pub(crate) fn without_foreign_ring_downs(&mut self, hypothesis: &Hypothesis) -> Result<bool, Refusal> {
-        let all = self.all_ring_downs(hypothesis)?;
+        let all = self.ring_downs(hypothesis)?;
         let usual = self.usual_drive(hypothesis);
         let through_skew = through_skew(hypothesis);
         let usual = usual.filter(|d| *d > 0.0);
@@ -96,8 +96,14 @@ impl Dataset {
         Ok(!odd.is_empty())
     }
 
-    fn all_ring_downs(&self, hypothesis: &Hypothesis) -> Result<Vec<RingDown>, Refusal> {
-        self.ring_down_runs.iter().map(|r| ring_down(r, hypothesis)).collect()
+    /// The ring-downs behind the readout of a hypothesis. One that is none there is taken as it was recorded: a readout that a fit tries may
+    /// be absurd, and the file is judged by what is in it.
+    ///
+    /// # Errors
+    /// Where a recording is no ring-down.
+    pub(crate) fn ring_downs(&self, hypothesis: &Hypothesis) -> Result<Vec<RingDown>, Refusal> {
+        let evaluated = |run| ring_down(run, hypothesis).or_else(|_| ring_down(run, &self.start));
+        self.ring_down_runs.iter().map(evaluated).collect()
     }
 
     /// The mean of −v_as/a over the directions, 1/1, of the usual rotation, less what v_qc does of it; `None` where it was not

@@ -1,0 +1,104 @@
+//! What a drive does where the angle, or the directions of the ring-downs, tell little of it; and single rows of the quadrature that
+//! were damaged.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use cvg_calibration::Origin;
+use cvg_model::effects::EffectId;
+use cvg_simulator::Settings;
+use cvg_simulator::scenario::Run;
+use cvg_tests::bench::{all, deviations, effect, found, identify, identify_folder, over_floor, plain_paper, scenario};
+
+/// A device without errors in rotations at these rates, deg/s, and ring-downs in these directions, deg.
+fn device(rates: &[f64], directions: &[f64], seed: u64) -> Settings {
+    let mut settings = plain_paper();
+    (settings.seed, settings.noise_v) = (seed, 2e-5);
+    let of = |settings: &Settings, is: fn(&Run) -> bool| settings.runs.iter().find(|r| is(r)).cloned().unwrap();
+    let rotation = of(&settings, |r| matches!(r, Run::Rotation { .. }));
+    let ring_down = of(&settings, |r| matches!(r, Run::Ringdown { .. }));
+    settings.runs.clear();
+    for rate in rates {
+        let mut run = rotation.clone();
+        if let Run::Rotation { file, rate_dps, duration_s, .. } = &mut run {
+            (*file, *rate_dps, *duration_s) = (format!("rot{rate:+}.csv"), *rate, 20.0);
+        }
+        settings.runs.push(run);
+    }
+    for direction in directions {
+        let mut run = ring_down.clone();
+        if let Run::Ringdown { file, angle_deg, .. } = &mut run {
+            (*file, *angle_deg) = (format!("ringdown{direction}.csv"), *direction);
+        }
+        settings.runs.push(run);
+    }
+    settings.effects =
+        vec![effect(EffectId::ActuationGainMismatch, &[1.0]), effect(EffectId::DetectionGainMismatch, &[1.0])];
+    settings
+}
+
+/// Equal gains and no ring-downs: the fit ended at a force scale of nothing, where no drive has a slope, and k was stated to 2e-8 and was
+/// 1.7e-5 off.
+#[test]
+fn a_trimmed_device_without_ring_downs_states_what_its_drives_may_do() {
+    let told = all(12, |seed| {
+        let ratio = if seed % 2 == 0 { 1.0 } else { 1.0113 };
+        let mut settings = device(if seed < 6 { &[466.0, -300.0] } else { &[200.0, -100.0] }, &[], seed);
+        settings.effects[0] = effect(EffectId::ActuationGainMismatch, &[ratio]);
+        let i = identify(settings.clone()).unwrap();
+        assert!(i.calibration.hypothesis.force_scale > 0.0, "seed {seed}");
+        assert!(found(&i, Origin::Discovered).is_empty(), "seed {seed}: {:?}", i.report.effects);
+        let anisodamping = i.report.effects.iter().find(|e| e.id == "anisodamping");
+        let size = anisodamping.map_or(0.0, |e| {
+            let [low, high] = e.parameters[0].ci95.unwrap();
+            e.parameters[0].value / (0.5 * (high - low))
+        });
+        [
+            deviations(&i.report.angular_gain, settings.angular_gain),
+            deviations(&i.report.detection_gain_ratio.unwrap(), 1.0),
+            2.0 * size,
+        ]
+    });
+    assert!(told.iter().flatten().all(|d| d.abs() < 4.0), "{told:?}");
+    assert!(told.iter().flatten().filter(|d| d.abs() > 2.0).count() <= 4, "{told:?}");
+}
+
+/// Ring-downs at 0° and 120°, and at 60° and 135° beside a skew of the drives: the loop that holds the pattern works on it too.
+#[test]
+fn ring_downs_in_any_direction_tell_the_drives_or_say_how_little() {
+    for (directions, ratio, skew, within) in
+        [([0.0, 120.0], 0.8, 0.0, 0.005), ([0.0, 90.0], 0.8, 0.0, 0.001), ([60.0, 135.0], 1.0, -0.033, 0.05)]
+    {
+        let mut settings = device(&[200.0, -90.0], &directions, 3);
+        settings.effects[0] = effect(EffectId::ActuationGainMismatch, &[ratio]);
+        if skew != 0.0 {
+            settings.effects.push(effect(EffectId::ActuationSkew, &[skew]));
+            settings.effects.sort_by_key(|e| e.id);
+        }
+        let i = identify(settings).unwrap();
+        if let Some(told) = &i.report.actuation_gain_ratio {
+            let off = deviations(told, ratio);
+            assert!(off.abs() < 3.0 && (told.value / ratio - 1.0).abs() < within, "{directions:?}: {told:?}");
+        }
+        let is_there = |id: &&str| *id == "actuation-skew" && skew != 0.0;
+        assert!(found(&i, Origin::Discovered).iter().all(|id| is_there(&id)), "{directions:?}: {:?}", i.report.effects);
+        assert!(over_floor(&i) < 1.3, "{directions:?}: {} × floor", over_floor(&i));
+    }
+}
+
+/// One value of xs_v that a telemetry line damaged: what the split made of its quadrature stayed in the angle to the end, and the answer was
+/// that nothing helps.
+#[test]
+fn one_row_whose_quadrature_leaps_leaves_nothing_behind() {
+    for column in ["xs_v", "ys_v"] {
+        let mut simulated = scenario(plain_paper()).simulate();
+        let run = simulated.runs.iter_mut().find(|r| matches!(r.run, Run::Rotation { .. })).unwrap();
+        let values = &mut run.columns.iter_mut().find(|c| c.name == column).unwrap().values;
+        let at = values.len() * 9 / 10;
+        values[at] += 0.7;
+        let folder = tempfile::tempdir().unwrap();
+        simulated.write(folder.path()).unwrap();
+        let i = identify_folder(folder.path()).unwrap();
+        assert!(over_floor(&i) < 1.3, "{column}: {} × floor", over_floor(&i));
+        let said = i.report.warnings.iter().filter(|w| w.contains("xs_v or ys_v leaps for single rows")).count();
+        assert_eq!(said, 1, "{column}: {:?}", i.report.warnings);
+    }
+}
