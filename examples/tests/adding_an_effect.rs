@@ -145,7 +145,10 @@ fn the_page_adds_an_effect_that_is_then_found() -> Result<()> {
     let target = std::env::current_exe()?.ancestors().nth(3).map(Path::to_owned).ok_or("no folder of builds")?;
     let own = target.join("adding-an-effect");
     shared(&target.join("debug"), &own.join("debug"))?;
+    // what is run there takes seconds, and its optimisation takes more
+    let unoptimised = ["calibration", "simulator"].map(|name| format!("profile.dev.package.cvg-{name}.opt-level=1"));
     let output = Command::new(env!("CARGO"))
+        .args(unoptimised.iter().flat_map(|setting| ["--config", setting]))
         .args([
             "test",
             "--workspace",

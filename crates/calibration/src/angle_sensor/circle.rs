@@ -35,7 +35,9 @@ pub(super) fn shows(readout: &Readout, runs: &[SensorRun]) -> bool {
         let recorded = ln_radius(run, &plain);
         let varies = root_mean_square(&recorded);
         let left = root_mean_square(&ln_radius(run, readout));
-        (left <= LEAST || left <= LESS_ROUND * varies)
+        // in the channels' unit: where offsets exceed the amplitude, what varies is a small share of a large radius
+        let [recorded_size, size] = [size(run), readout.amplitude * readout.radius];
+        (left <= LEAST || left * size <= LESS_ROUND * varies * recorded_size)
             && parts.iter().all(|part| {
                 let with_it = ln_radius(run, part);
                 let does: Vec<f64> = with_it.iter().zip(&recorded).map(|(a, b)| a - b).collect();
@@ -43,6 +45,12 @@ pub(super) fn shows(readout: &Readout, runs: &[SensorRun]) -> bool {
                 does <= LEAST || SHOWN * does <= varies
             })
     })
+}
+
+/// Mean distance of a run's readings from nothing, in their unit.
+fn size(run: &SensorRun) -> f64 {
+    let all = run.channels().unwrap_or_default();
+    all.iter().map(|[x, y]| x.hypot(*y)).sum::<f64>() / all.len().max(1) as f64
 }
 
 /// The causes in a readout, each by itself: offsets, gain, skew, cubics, every effect as text.

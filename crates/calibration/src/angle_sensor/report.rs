@@ -27,7 +27,7 @@ use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::report::stages::stages;
-use crate::report::unexplained::residual_report;
+use crate::report::unexplained::{left_over, residual_report};
 use crate::report::{
     EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport,
     Temperature, Tool, Unexplained,
@@ -210,6 +210,10 @@ pub(crate) fn report(
     if spikes > 0 {
         warnings.push(format!("{spikes} samples were set aside as spikes"));
     }
+    let heldout = errors.heldout(held);
+    if finding.instrument == Instrument::Sensor {
+        warnings.extend(left_over(&heldout));
+    }
     let mut steps = stages(raw.as_ref(), declared, discovered, &[]);
     steps.extend(effects.iter().filter(|e| e.origin != Origin::Declared).map(|e| step(e, discovered)));
     let names: Vec<String> = held.iter().map(|r| r.name.clone()).collect();
@@ -230,7 +234,7 @@ pub(crate) fn report(
         actuation_gain_ratio: None,
         unexplained: described(&effects, &finding),
         effects,
-        heldout: errors.heldout(held),
+        heldout,
         steps,
         residual: residual_report(&errors.on_fit, discovered),
         channels: Vec::new(),

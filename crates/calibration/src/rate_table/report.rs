@@ -24,9 +24,9 @@ use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
-use crate::report::unexplained::{described, residual_report, unexplained};
+use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool,
+    EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool,
 };
 use crate::selection::step::Step;
 
@@ -262,20 +262,6 @@ fn uneven(file: &str, ring_down: &RingDown) -> Option<String> {
             "{file}: the amplitude does not decay exponentially, {:.2} % rms is left of it beyond noise: something changed \
              on its way, or the readout bends; the interval of its time constant, and of the actuation gain ratio, covers as much",
             100.0 * ring_down.uneven
-        )
-    })
-}
-
-/// Held-out errors of more than this many noise floors have a cause that was not found; the blind trial's largest is 1.1.
-const LEFT_OVER: f64 = 3.0;
-
-/// Says that more than noise is left.
-fn left_over(heldout: &Heldout) -> Option<String> {
-    let floors = heldout.discovered.rms_deg / heldout.noise_floor_deg;
-    (floors.is_finite() && floors > LEFT_OVER).then(|| {
-        format!(
-            "what is left on held-out data is {floors:.1} times the noise floor: an effect that nothing here explains, a \
-             recording that changed on its way, or noise that wanders; what is left may be in every value as well"
         )
     })
 }
