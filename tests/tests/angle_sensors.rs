@@ -5,7 +5,7 @@
 use cvg_calibration::recording::{Campaign, Recording, Reference, Role, Run};
 use cvg_calibration::report::Status;
 use cvg_calibration::{Options, compensate, identify};
-use cvg_tests::angle_sensor::{Noise, channels, find, held_out, identified, lines, read_at, run, sensor};
+use cvg_tests::angle_sensor::{Noise, angle_at, channels, find, held_out, identified, lines, read_at, run, sensor};
 
 /// A turn of 370° there and back at `rate` deg/s but for ramps of `ramp` seconds, 100 samples/s: time, angle of the table in
 /// deg, rate in deg/s.
@@ -457,5 +457,43 @@ fn a_recording_of_another_sensor_or_with_exchanged_channels_is_not_compensated()
     // in radians, and another number of poles
     for by in [1f64.to_radians(), 0.25] {
         assert!(refused(turned(by, sound())).contains("times as far as its reference"));
+    }
+}
+
+/// Analogue Hall sensors read as they come: far from nothing, with a third harmonic of their own, so that the radius is rounder in volts and
+/// not in shares of itself. The raw angle hardly turns.
+#[test]
+fn offsets_far_beyond_the_amplitude_are_centred_whatever_their_size() {
+    for ratio in [5.0, 9.0, 12.0, 20.0] {
+        let mut noise = Noise::new(7);
+        let angles: Vec<f64> = (0..1500).map(|i| 2.4 * f64::from(i)).collect();
+        let mut read = |phase: f64, gain: f64| -> Vec<f64> {
+            let of = |a: &f64| {
+                let a = a.to_radians() - phase;
+                5.0 * (ratio + gain * (a.cos() + 0.1 * (3.0 * a).cos())) + 0.05 * noise.sample()
+            };
+            angles.iter().map(of).collect()
+        };
+        let (x, y) = (read(0.0, 1.0), read(1.5, 0.9));
+        let i = identified(sensor(vec![read_at(angles.clone(), x, y, Role::Fit)]));
+        assert_eq!(i.report.status, Status::Answered, "{ratio}");
+        assert!(i.report.heldout.raw.is_none(), "{ratio}: {:?}", i.report.heldout);
+        assert!(held_out(&i) < 3.0, "{ratio}: {}°", held_out(&i));
+    }
+}
+
+/// A line in time, of which a sensor has no model: what is left is said to be far more than noise.
+#[test]
+fn what_is_left_of_a_sensor_beyond_its_noise_is_said() {
+    for (size, said) in [(0.5, 1), (0.0, 0)] {
+        let mut noise = Noise::new(3);
+        let angles: Vec<f64> = (0..6000).map(|i| 0.73 * f64::from(i)).collect();
+        let theta = |degrees: f64| {
+            let t_s = degrees / 0.73;
+            degrees + 0.4 * degrees.to_radians().sin() + size * (0.171 * t_s).sin() + 0.01 * noise.sample()
+        };
+        let i = identified(sensor(vec![angle_at(angles, theta, Role::Fit)]));
+        let told = i.report.warnings.iter().filter(|w| w.contains("times the noise floor")).count();
+        assert_eq!(told, said, "{size}: {:?}", i.report.warnings);
     }
 }

@@ -25,9 +25,7 @@ use crate::report::proposals::proposals;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
-use crate::report::{
-    EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool,
-};
+use crate::report::{EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool};
 use crate::selection::step::Step;
 
 /// What the campaign says of itself, kept while its recordings are taken apart.
