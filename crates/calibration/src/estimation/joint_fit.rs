@@ -295,6 +295,16 @@ impl Dataset {
         }
     }
 
+    /// Takes the drive to be as nothing but the energy balance tells it: where it was free, a misfit may have dragged it along.
+    fn believe_the_drive(&self, hypothesis: &mut Hypothesis) {
+        if let Some(member) = hypothesis.position(EffectId::ActuationGainMismatch) {
+            hypothesis.set(Unknown::Effect(member, 0), 1.0);
+        }
+        if let Some(scale) = self.believed_force_scale().filter(|_| self.energy_balance.is_none()) {
+            hypothesis.force_scale = scale;
+        }
+    }
+
     /// Fits a hypothesis from where the runs are, moves them there and measures what is left; says whether that is what
     /// the fit was weighted by.
     pub(super) fn fitted(
@@ -485,6 +495,14 @@ const MOST_ROUNDS: usize = 6;
 /// Weights that what is left contradicts by more than this factor call for another round.
 const SAME_NOISE: f64 = 1.5;
 
+/// Whether a fit has the drive where no drive is: it pushes nothing, or the ratio of its gains is at a bound.
+#[allow(clippy::float_cmp, reason = "a value that was clamped is its bound")]
+fn drive_ends_at_its_bounds(hypothesis: &Hypothesis) -> bool {
+    let bounds = &EffectId::ActuationGainMismatch.description().parameters[0];
+    let ratio = hypothesis.member(EffectId::ActuationGainMismatch).map(|m| m.values[0]);
+    hypothesis.force_scale <= 0.0 || ratio.is_some_and(|ratio| ratio == bounds.lower || ratio == bounds.upper)
+}
+
 /// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
 ///
 /// What the commands do is adjusted last, and only when little else is left or it explains most of what is: it multiplies,
@@ -523,6 +541,9 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         let last = round + 1 >= ROUNDS;
         let freed = last && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
         dataset.drive_is_free = dataset.tells_the_drive() && (dataset.drive_is_free_at_once || freed);
+        if drive.is_none() && !dataset.drive_is_free {
+            dataset.believe_the_drive(&mut hypothesis);
+        }
         let (result, settled) =
             dataset.fitted(&hypothesis, drive.as_ref(), if last { Effort::FULL } else { Effort::ROUGH });
         hypothesis = result.hypothesis.clone();
@@ -544,10 +565,10 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             }
             dataset.weigh_by(&held);
         }
-        let result = if dataset.drive_is_free && result.hypothesis.force_scale <= 0.0 {
+        let result = if drive.is_none() && dataset.drive_is_free && drive_ends_at_its_bounds(&result.hypothesis) {
             // the angle does not tell it after all
             dataset.drive_is_free = false;
-            dataset.balance_energy(&mut hypothesis);
+            dataset.believe_the_drive(&mut hypothesis);
             dataset.fitted_anew(&hypothesis, drive.as_ref())
         } else {
             result
