@@ -495,12 +495,15 @@ const MOST_ROUNDS: usize = 6;
 /// Weights that what is left contradicts by more than this factor call for another round.
 const SAME_NOISE: f64 = 1.5;
 
-/// Whether a fit has the drive where no drive is: it pushes nothing, or the ratio of its gains is at a bound.
-#[allow(clippy::float_cmp, reason = "a value that was clamped is its bound")]
-fn drive_ends_at_its_bounds(hypothesis: &Hypothesis) -> bool {
-    let bounds = &EffectId::ActuationGainMismatch.description().parameters[0];
-    let ratio = hypothesis.member(EffectId::ActuationGainMismatch).map(|m| m.values[0]);
-    hypothesis.force_scale <= 0.0 || ratio.is_some_and(|ratio| ratio == bounds.lower || ratio == bounds.upper)
+/// Deviations of its belief beyond which a ratio of the drives is none.
+const INCREDIBLE: f64 = 4.0;
+
+/// Whether a fit has the drive where no drive is: it pushes nothing, or the ratio of its gains is beyond all belief.
+fn drive_is_incredible(hypothesis: &Hypothesis) -> bool {
+    let parameter = &EffectId::ActuationGainMismatch.description().parameters[0];
+    let Belief::Within(deviation) = parameter.belief else { return false };
+    let ratio = hypothesis.member(EffectId::ActuationGainMismatch).map_or(parameter.neutral, |m| m.values[0]);
+    hypothesis.force_scale <= 0.0 || (ratio - parameter.neutral).abs() > INCREDIBLE * deviation
 }
 
 /// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
@@ -541,7 +544,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         let last = round + 1 >= ROUNDS;
         let freed = last && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
         dataset.drive_is_free = dataset.tells_the_drive() && (dataset.drive_is_free_at_once || freed);
-        if drive.is_none() && !dataset.drive_is_free {
+        if drive.is_none() && !dataset.drive_is_free && drive_is_incredible(&hypothesis) {
             dataset.believe_the_drive(&mut hypothesis);
         }
         let (result, settled) =
@@ -565,7 +568,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             }
             dataset.weigh_by(&held);
         }
-        let result = if drive.is_none() && dataset.drive_is_free && drive_ends_at_its_bounds(&result.hypothesis) {
+        let result = if drive.is_none() && dataset.drive_is_free && drive_is_incredible(&result.hypothesis) {
             // the angle does not tell it after all
             dataset.drive_is_free = false;
             dataset.believe_the_drive(&mut hypothesis);
