@@ -498,12 +498,13 @@ const SAME_NOISE: f64 = 1.5;
 /// Deviations of its belief beyond which a ratio of the drives is none.
 const INCREDIBLE: f64 = 4.0;
 
-/// Whether a fit has the drive where no drive is: it pushes nothing, or the ratio of its gains is beyond all belief.
-fn drive_is_incredible(hypothesis: &Hypothesis) -> bool {
+/// Whether a fit has the drive where no drive is, whose commands were recorded: it pushes nothing, or the ratio of its gains is beyond all
+/// belief.
+fn drive_is_incredible(hypothesis: &Hypothesis, commanded: bool) -> bool {
     let parameter = &EffectId::ActuationGainMismatch.description().parameters[0];
     let Belief::Within(deviation) = parameter.belief else { return false };
     let ratio = hypothesis.member(EffectId::ActuationGainMismatch).map_or(parameter.neutral, |m| m.values[0]);
-    hypothesis.force_scale <= 0.0 || (ratio - parameter.neutral).abs() > INCREDIBLE * deviation
+    commanded && (hypothesis.force_scale <= 0.0 || (ratio - parameter.neutral).abs() > INCREDIBLE * deviation)
 }
 
 /// Fits `hypothesis` with its ring-downs: readout first, then the drive from the ring-downs, then all together.
@@ -522,6 +523,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
     {
         hypothesis.set(Unknown::Effect(member, 0), 1.0);
     }
+    let commanded = dataset.believed_force_scale().is_some();
     let mut explains = None;
     let mut round = 0;
     loop {
@@ -544,7 +546,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
         let last = round + 1 >= ROUNDS;
         let freed = last && (explains == Some(true) || dataset.excess() < LARGEST_EXCESS);
         dataset.drive_is_free = dataset.tells_the_drive() && (dataset.drive_is_free_at_once || freed);
-        if drive.is_none() && !dataset.drive_is_free && drive_is_incredible(&hypothesis) {
+        if drive.is_none() && !dataset.drive_is_free && drive_is_incredible(&hypothesis, commanded) {
             dataset.believe_the_drive(&mut hypothesis);
         }
         let (result, settled) =
@@ -568,7 +570,7 @@ pub(crate) fn fit_with_ring_downs(dataset: &mut Dataset, hypothesis: &Hypothesis
             }
             dataset.weigh_by(&held);
         }
-        let result = if drive.is_none() && dataset.drive_is_free && drive_is_incredible(&result.hypothesis) {
+        let result = if drive.is_none() && dataset.drive_is_free && drive_is_incredible(&result.hypothesis, commanded) {
             // the angle does not tell it after all
             dataset.drive_is_free = false;
             dataset.believe_the_drive(&mut hypothesis);
