@@ -79,7 +79,7 @@ fn ring_downs_in_any_direction_tell_the_drives_or_say_how_little() {
             assert!(off.abs() < 3.0 && (told.value / ratio - 1.0).abs() < within, "{directions:?}: {told:?}");
         }
         let is_there = |id: &&str| *id == "actuation-skew" && skew != 0.0;
-        assert!(found(&i, Origin::Discovered).iter().all(|id| is_there(&id)), "{directions:?}: {:?}", i.report.effects);
+        assert!(found(&i, Origin::Discovered).iter().all(is_there), "{directions:?}: {:?}", i.report.effects);
         assert!(over_floor(&i) < 1.3, "{directions:?}: {} × floor", over_floor(&i));
     }
 }
