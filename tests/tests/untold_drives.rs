@@ -74,6 +74,7 @@ fn ring_downs_in_any_direction_tell_the_drives_or_say_how_little() {
             settings.effects.sort_by_key(|e| e.id);
         }
         let i = identify(settings).unwrap();
+        assert!(i.report.actuation_gain_ratio.is_some() || skew != 0.0, "{directions:?}: {:?}", i.report.warnings);
         if let Some(told) = &i.report.actuation_gain_ratio {
             let off = deviations(told, ratio);
             assert!(off.abs() < 3.0 && (told.value / ratio - 1.0).abs() < within, "{directions:?}: {told:?}");

@@ -22,9 +22,9 @@ const ANOTHER_UNIT: f64 = 3.0;
 const OUTSIDE: f64 = 1.2;
 /// The rate of a sensor's own angle is that over so many times what it is late by: noise of the angle then adds a tenth of itself.
 const LATENCIES: f64 = 14.0;
-/// Units that are taken for volts, and what they are called.
 /// A row is beyond the part of the period that was covered from so much of the period on.
 const EDGE: f64 = 0.02;
+/// Units that are taken for volts, and what they are called.
 const UNITS: [(f64, &str); 3] = [(1e3, "millivolts"), (1e6, "microvolts"), (1e-3, "kilovolts")];
 
 /// Compensates a recording.
