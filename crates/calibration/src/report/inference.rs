@@ -6,7 +6,7 @@ use cvg_model::effects::{EffectId, Parameter, Role as ParameterRole, Shown, Stag
 use nalgebra::DMatrix;
 
 use crate::diagnostics::evaluate::{Evaluation, evaluate};
-use crate::estimation::actuation::{DriveGains, ring_down};
+use crate::estimation::actuation::DriveGains;
 use crate::estimation::coloured_noise::DRIFT_RAD_S;
 use crate::estimation::fit::Prior;
 use crate::estimation::identifiability::{confounded_with, separated_by};
@@ -349,8 +349,7 @@ impl Inference<'_> {
     /// is told per amplitude, and the amplitudes of both axes are known as well as the gains of the detection are.
     fn with_the_readouts_share(&self, ratio: Estimate, detection: Option<Estimate>) -> Estimate {
         let told = |h: &Hypothesis| {
-            let runs = self.dataset.ring_down_runs.iter().map(|r| ring_down(r, h));
-            let all = runs.collect::<Result<Vec<_>, _>>().ok()?;
+            let all = self.dataset.ring_downs(h).ok()?;
             DriveGains::from_ring_downs(&all).map(|d| d.ratio().ln())
         };
         let Some(nominal) = self.fitted.drive.as_ref().and_then(|_| told(self.hypothesis())) else { return ratio };
