@@ -280,6 +280,15 @@ fn a_commanded_reference_is_not_believed_and_the_radius_tells_the_gain() {
         assert!((ratio.value - 0.2 / 0.23).abs() < 0.004, "{ratio:?}");
         assert!(ratio.half_width() < 0.01, "{ratio:?}");
         assert!(i.report.effects.iter().all(|e| e.id.starts_with("detection-")), "{:#?}", i.report.effects);
+        // what is left is said, and whose it may be
+        let left: Vec<_> = i.report.unexplained.iter().map(|u| (u.class.as_str(), u.n)).collect();
+        assert_eq!(
+            left[..2],
+            [("pattern-harmonic", Some(1)), ("pattern-harmonic", Some(2))],
+            "{:?}",
+            i.report.unexplained
+        );
+        assert!(i.report.unexplained[0].suggestion.contains("reference = \"measured\""));
     }
 }
 
@@ -496,4 +505,25 @@ fn what_is_left_of_a_sensor_beyond_its_noise_is_said() {
         let told = i.report.warnings.iter().filter(|w| w.contains("times the noise floor")).count();
         assert_eq!(told, said, "{size}: {:?}", i.report.warnings);
     }
+}
+
+/// A sensor whose channel is cut off and bent, so that its table does what the readout cannot and no radius is round: its own recording was
+/// refused, because a raw radius with large offsets varies by less.
+#[test]
+fn a_sensor_that_no_readout_makes_round_compensates_its_own_recording() {
+    let of = |role, seed| {
+        let mut noise = Noise::new(seed);
+        let angles: Vec<f64> = (0..2048).map(|i| f64::from(i) * 360.0 / 512.0).collect();
+        let turned = |a: &f64| a.to_radians() + 0.15 * (a.to_radians() + 0.7).sin();
+        let x = angles
+            .iter()
+            .map(|a| 2.4 + turned(a).cos() + 0.25 * (2.0 * turned(a)).sin() + 1e-3 * noise.sample())
+            .collect();
+        let mut other = Noise::new(seed + 100);
+        let y = angles.iter().map(|a| (1.2 + turned(a).sin()).max(0.6) + 1e-3 * other.sample()).collect();
+        read_at(angles, x, y, role)
+    };
+    let i = identified(sensor(vec![of(Role::Fit, 1), of(Role::Holdout, 2)]));
+    let own = compensate(&i.calibration, &of(Role::Fit, 3).recording).unwrap();
+    assert!(own.warnings.iter().all(|w| !w.contains("another sensor")), "{:?}", own.warnings);
 }

@@ -1,7 +1,7 @@
 //! The held-out runs are read when all is decided: another held-out run changes the error that is reported, and nothing else.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use cvg_calibration::recording::{Campaign, Role};
+use cvg_calibration::recording::{Campaign, Channel, Role};
 use cvg_calibration::report::{EffectReport, Report};
 use cvg_calibration::{Options, Origin, identify};
 use cvg_simulator::Scenario;
@@ -40,4 +40,24 @@ fn what_is_held_out_changes_the_reported_error_and_no_answer() {
     let [before, after] = [&as_it_was, &with_another].map(|r| r.heldout.discovered.rms_deg);
     assert!(after > 3.0 * before, "{before} and {after}");
     assert!(with_another.runs.iter().all(|r| r.r#use != "left out"), "{:?}", with_another.runs);
+}
+
+/// A run that was to be held out and that turns the pattern by a third of a turn is left out, and the answer was "only 0 samples are left".
+#[test]
+fn where_no_run_is_left_to_hold_out_the_last_quarters_are() {
+    let told = report(|campaign| {
+        for run in campaign.runs.iter_mut().filter(|r| r.role == Role::Holdout) {
+            let rate_dps = run.recording.rate_dps.as_ref().unwrap()[0].abs();
+            let lasts_s = run.recording.t_s[0] + run.settle_s + 120.0 / (0.78 * rate_dps);
+            let rows = run.recording.t_s.partition_point(|t| *t < lasts_s);
+            for channel in Channel::ALL {
+                if let Some(values) = run.recording.channel(channel).map(|values| values[..rows].to_vec()) {
+                    run.recording.set_channel(channel, values);
+                }
+            }
+        }
+    });
+    assert!(told.warnings.iter().any(|w| w.contains("the last quarter of each of the others is held out")));
+    assert_eq!(told.runs.iter().filter(|r| r.r#use == "left out").count(), 2, "{:?}", told.runs);
+    assert!(told.heldout.discovered.rms_deg < 1.3 * told.heldout.noise_floor_deg, "{:?}", told.heldout);
 }

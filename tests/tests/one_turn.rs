@@ -1,6 +1,7 @@
 //! Angle sensors as engineers hand them over: one turn in one file, ten headings, one pass, half a turn, an angle in another unit.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use cvg_calibration::compensate;
 use cvg_calibration::recording::Role;
 use cvg_calibration::report::Status;
 use cvg_tests::angle_sensor::{Noise, a_row_a_second, angle_at, find, held_out, identified, read_at, sensor};
@@ -176,5 +177,37 @@ fn in_one_pass_time_and_angle_have_no_share_of_their_own() {
             shares.iter().all(|s| possible(s.share) && s.ci95.iter().all(|c| possible(*c))),
             "seed {seed}: {shares:?}"
         );
+    }
+}
+
+/// Two channels with offsets beyond their amplitude and an error once a turn that tilts a line through one turn: the periods a turn, 0.95 by
+/// the line, were taken for a gear, and the answer was a gain of nothing and a table that takes the angle away, "0.0001° left".
+#[test]
+fn an_error_that_tilts_one_turn_is_no_gear_and_no_answer_stands_still() {
+    for (eccentricity, offset, sense) in
+        [(0.1, 1.5, 1.0), (0.15, 1.5, 1.0), (0.15, 3.0, -1.0), (0.3, 1.5, 1.0), (0.3, 3.0, -1.0)]
+    {
+        let at = |role, seed| {
+            let mut noise = Noise::new(seed);
+            let degrees: Vec<f64> = (0..200).map(|i| f64::from(i) * 1.8).collect();
+            let turned = |d: &f64| (sense * d).to_radians() + eccentricity * d.to_radians().sin();
+            let (x, y) = degrees
+                .iter()
+                .map(|d| {
+                    (
+                        offset + turned(d).cos() + 2e-3 * noise.sample(),
+                        offset + 0.8 * turned(d).sin() + 2e-3 * noise.sample(),
+                    )
+                })
+                .unzip();
+            read_at(degrees, x, y, role)
+        };
+        let i = identified(sensor(vec![at(Role::Fit, 5), at(Role::Holdout, 6)]));
+        let case = format!("{eccentricity} {offset} {sense}");
+        assert_eq!(i.report.angular_gain.value.abs(), 1.0, "{case}: {:?}", i.report.warnings);
+        assert!(held_out(&i) < 0.3, "{case}: {}°", held_out(&i));
+        let compensated = compensate(&i.calibration, &at(Role::Fit, 7).recording).unwrap();
+        let theta = compensated.theta_deg.unwrap();
+        assert!((theta[199] - theta[0]).abs() > 350.0, "{case}: from {} to {}", theta[0], theta[199]);
     }
 }

@@ -13,7 +13,7 @@ use super::table_fit::{TableFit, by_run};
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::numerics::linear::NormalEquations;
 
-/// Deviations from which on a parameter of an effect as text is no chance: by Student's t of 19 degrees of freedom 1 in 2,000.
+/// Deviations from which on a parameter of an effect as text, or a cubic, is no chance: by Student's t of 19 degrees of freedom 1 in 2,000.
 const NO_CHANCE: f64 = 4.2;
 /// A change of a parameter, in its scale, that shows what it does.
 const NUDGE: f64 = 1e-3;
@@ -23,6 +23,8 @@ const NUDGE: f64 = 1e-3;
 pub(crate) struct Deviations {
     /// of [`values`]
     pub(crate) readout: Vec<f64>,
+    /// … by the jackknife alone: what of them another recording would tell otherwise
+    repeated: Vec<f64>,
     /// of [`TableFit::side`]
     pub(crate) side: Vec<f64>,
     /// of the table's cosines and sines
@@ -31,6 +33,15 @@ pub(crate) struct Deviations {
 }
 
 impl Deviations {
+    /// The largest kind of readout of which something that a smaller lacks is told from nothing, whatever else may have made it; any without
+    /// cubics.
+    pub(crate) fn told(&self, readout: &Readout) -> Kind {
+        let v = values(readout);
+        let is_told = |i: usize| v[i].abs() > NO_CHANCE * self.repeated[i];
+        let holds_cubics = readout.kind >= Kind::Cubic;
+        if holds_cubics && !is_told(4) && !is_told(5) { Kind::Affine } else { Kind::CubicPerChannel }
+    }
+
     /// The effects as text of a readout of which no parameter is far enough from its absence to be more than a chance.
     pub(crate) fn texts_not_told(&self, readout: &Readout) -> Vec<EffectId> {
         let absent = |(at, (id, values)): (usize, &(EffectId, Values<f64>))| {
@@ -83,6 +94,7 @@ pub(crate) fn deviations(model: &SensorModel, runs: &[SensorRun]) -> Deviations 
     };
     Deviations {
         readout: (0..count).map(|i| readout(i).hypot(beyond(i))).collect(),
+        repeated: (0..count).map(readout).collect(),
         side: (0..model.table.side.len()).map(|i| of(&|f| f.1.side[i])).collect(),
         cos: (0..order).map(|i| of(&|f| f.1.table.cos[i])).collect(),
         sin: (0..order).map(|i| of(&|f| f.1.table.sin[i])).collect(),

@@ -266,14 +266,20 @@ pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> V
     if kind >= Kind::Affine {
         add(EffectId::DetectionGainMismatch, Origin::Declared, &[2]);
     }
-    if kind >= Kind::Offset && (significant(0, 0.0) || significant(1, 0.0)) {
-        add(EffectId::DetectionOffset, Origin::Discovered, &[0, 1]);
-    }
-    if kind >= Kind::Affine && significant(3, 0.0) {
-        add(EffectId::DetectionSkew, Origin::Discovered, &[3]);
-    }
-    if kind >= Kind::Cubic && (significant(4, 0.0) || significant(5, 0.0)) {
-        add(EffectId::DetectionCubic, Origin::Discovered, if kind == Kind::Cubic { &[4] } else { &[4, 5] });
+    let cubics: &[usize] = if kind == Kind::Cubic { &[4] } else { &[4, 5] };
+    let others: [(Kind, EffectId, &[usize]); 3] = [
+        (Kind::Offset, EffectId::DetectionOffset, &[0, 1]),
+        (Kind::Affine, EffectId::DetectionSkew, &[3]),
+        (Kind::Cubic, EffectId::DetectionCubic, cubics),
+    ];
+    let mut not_told = String::new();
+    for (_, id, at) in others.into_iter().filter(|(from, ..)| kind >= *from) {
+        if at.iter().any(|i| significant(*i, 0.0)) {
+            add(id, Origin::Discovered, at);
+        } else {
+            let named = at.iter().zip(id.description().parameters).map(|(&i, p)| format!(" {} {:.2e}", p.name, v[i]));
+            not_told.extend(named);
+        }
     }
     for (at, (id, _)) in readout.texts.iter().enumerate() {
         let first = LIBRARY_VALUES + at * MAX_PARAMETERS;
@@ -288,6 +294,10 @@ pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> V
         let evidence = "the extreme value of the channel occurs far more often than the level beside it: a converter \
                         at its rail; the other channel and the radius stand in for it";
         out.push(effect("detection-clip", Origin::Discovered, rails.collect(), evidence.into()));
+    }
+    if let Some(first) = out.first_mut().filter(|_| !not_told.is_empty()) {
+        first.evidence.push_str("; undone with it, no further from nothing than their intervals:");
+        first.evidence.push_str(&not_told);
     }
     out
 }

@@ -11,7 +11,7 @@ use super::odd_runs::without_odd_runs;
 use super::pattern_or_rate::Rate;
 use super::rate_finding::{Stated, rate_finding};
 use super::rate_runs;
-use super::readout::Kind;
+use super::readout::{Competing, Kind};
 use super::report::{ByItself, Errors, Finding, Head, report};
 use super::samples::{Reading, SensorRun, apart, prepare};
 use super::screening::{LARGEST_STEP, believed};
@@ -152,7 +152,8 @@ pub(crate) fn identify(
     } else {
         let all: Vec<usize> = fitted.iter().map(|run| run.number).collect();
         let asked_for = positions(&held);
-        let identify = |runs: &[SensorRun]| SensorModel::identify(stated, period, runs, &texts, &asked_for);
+        let competing = Competing::with(&texts);
+        let identify = |runs: &[SensorRun]| SensorModel::identify(stated, period, runs, competing, &asked_for);
         let model;
         (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
         held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
@@ -240,10 +241,7 @@ fn require_following(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result
 
 /// The raw angle turns, because the origin lies within what the channels draw.
 fn raw_turns(model: &SensorModel) -> bool {
-    model.front().is_none_or(|r| {
-        let [x, y] = r.undo([0.0, 0.0]);
-        r.kind == Kind::Plain || x.hypot(y) < r.radius
-    })
+    model.front().is_none_or(|r| r.kind == Kind::Plain || r.is_about_the_origin())
 }
 
 /// What has to be said of a model before its numbers.
@@ -270,7 +268,8 @@ fn said_of(
     if model.by_radius {
         warnings.push(
             "the reference was commanded and not measured: the readout is known from the radius of its ellipse alone, and \
-             the angle errors stated are those against what was commanded"
+             the angle errors stated are those against what was commanded; of a reference that was kept, reference = \"measured\" in \
+             campaign.toml lets the angle tell as well"
                 .into(),
         );
     }
@@ -288,23 +287,27 @@ fn competing(effects: &[EffectId], runs: &[SensorRun]) -> (Vec<EffectId>, Option
     (texts, not_tried(&others, why))
 }
 
-/// The model of a sensor, with the deviations of its values. An effect as text that the intervals do not tell from its absence
-/// is none: the model is identified without it.
+/// The model of a sensor, with the deviations of its values. An effect as text, or cubics, that the intervals do not tell from their
+/// absence are none: the model is identified without them.
 fn identified(
     asked: Asked,
     mut model: SensorModel,
     [runs, held]: [&[SensorRun]; 2],
     mut texts: Vec<EffectId>,
 ) -> Result<(SensorModel, Deviations), Refusal> {
+    let mut largest = Kind::CubicPerChannel;
     loop {
         let mut deviations = deviations(&model, &thinned(runs));
         let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
-        if unsure.is_empty() {
+        let told = model.front().map_or(largest, |readout| deviations.told(readout)).min(largest);
+        if unsure.is_empty() && told == largest {
             model.without_motion_by_chance(&mut deviations);
             return Ok((model, deviations));
         }
         texts.retain(|id| !unsure.contains(id));
-        model = SensorModel::identify(asked.stated, asked.period, runs, &texts, &positions(held))?;
+        largest = told;
+        let competing = Competing { largest, texts: &texts };
+        model = SensorModel::identify(asked.stated, asked.period, runs, competing, &positions(held))?;
     }
 }
 

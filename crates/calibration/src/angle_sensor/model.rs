@@ -1,13 +1,11 @@
 //! The identified sensor: what was selected, fitted to all rows, with the checks that decide whether it is an answer.
 
-use cvg_model::effects::EffectId;
-
 use super::circle;
 use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
 use super::deviations::Deviations;
 use super::lines::alias_elsewhere;
 use super::rails::Rails;
-use super::readout::{Kind, Readout};
+use super::readout::{Competing, Kind, Readout};
 use super::readout_fit::{Weighting, fit};
 use super::samples::SensorRun;
 use super::selection::{Front, Selected, Selection, fit_from, starts};
@@ -18,6 +16,8 @@ use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
 use crate::model::hypothesis::Origin;
 
+/// A free gain changes by this share at most: what the readout and errors of the position take of a line.
+const LARGEST_CHANGE_OF_GAIN: f64 = 0.5;
 /// Rows of the last fit; more would not narrow what still means something.
 const ENOUGH_ROWS: usize = 100_000;
 /// What an ellipse may leave of the radius, rms, where nothing else tells the readout: engineering choice.
@@ -63,7 +63,7 @@ impl SensorModel {
         stated_gain: Option<f64>,
         period: f64,
         runs: &[SensorRun],
-        texts: &[EffectId],
+        competing: Competing<'_>,
         asked: &[f64],
     ) -> Result<Self, Refusal> {
         let sensor = Sensor::new(stated_gain, period, runs)?;
@@ -75,7 +75,7 @@ impl SensorModel {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
-        let mut selection = Selection::new(&sensor, runs, rails, &starts, texts, asked);
+        let mut selection = Selection::new(&sensor, runs, rails, &starts, competing, asked);
         let selected = selection.select();
         let refusal = || {
             Refusal::no_answer(
@@ -156,6 +156,10 @@ impl SensorModel {
             stands = of_angle + autoregression::gain(&ln_radius(&raw), &ln_radius(&found), 0) > 0.0;
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
             (readout, predicted) = (Some((found, weighting)), losses.rms());
+        }
+        if table.moved_gain().abs() > LARGEST_CHANGE_OF_GAIN * sensor.gain.abs() {
+            // the angle was taken away with its error
+            return None;
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();

@@ -47,6 +47,22 @@ impl Kind {
     }
 }
 
+/// Readouts that compete.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Competing<'a> {
+    /// the largest kind of readout
+    pub(crate) largest: Kind,
+    /// effects as text
+    pub(crate) texts: &'a [EffectId],
+}
+
+impl<'a> Competing<'a> {
+    /// All of the library, and these effects as text.
+    pub(crate) fn with(texts: &'a [EffectId]) -> Self {
+        Self { largest: Kind::CubicPerChannel, texts }
+    }
+}
+
 /// Something of a readout that a fit adjusts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unknown {
@@ -185,6 +201,12 @@ impl Readout {
         let y = ((z[1] - self.centre[1]) / self.amplitude - p[1]) / p[2].exp() - p[3] * x;
         let [kx, ky] = self.cubics();
         [without_cubic(x, kx), without_cubic(y, ky)]
+    }
+
+    /// The origin lies within what the channels draw.
+    pub(crate) fn is_about_the_origin(&self) -> bool {
+        let [x, y] = self.undo([0.0, 0.0]);
+        x.hypot(y) < self.radius
     }
 
     /// A reading before the effects as text acted on it; not a number where one of them has no inverse.

@@ -73,6 +73,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         amplitude_v: provenance::amplitudes(&campaign),
         readout_unit: provenance::readout_unit(&campaign),
         covered_deg: None,
+        radius_left: None,
     };
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);

@@ -20,14 +20,14 @@ use crate::facts::Follows;
 use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, root_mean_square};
+use crate::numerics::statistics::{median, robust_deviation, root_mean_square};
 use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::report::stages::stages;
-use crate::report::unexplained::{left_over, residual_report};
+use crate::report::unexplained::{against_a_command, left_over, residual_report};
 use crate::report::{
     EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport,
     Temperature, Tool, Unexplained,
@@ -101,6 +101,7 @@ impl Head {
             amplitude_v: self.amplitude_v,
             readout_unit: self.readout_unit,
             covered_deg: covered_deg(&hypothesis, fitted),
+            radius_left: radius_left(&hypothesis, fitted),
         };
         Calibration { device: self.device, hypothesis, provenance }
     }
@@ -116,6 +117,21 @@ fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<[f64; 2]
     });
     let covered = Gap::of(angles, std::f64::consts::TAU / hypothesis.period_rad)?.covered();
     Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
+}
+
+/// What is left of the radius of the fitted rows, of each run about its median, as a robust deviation and a share.
+fn radius_left(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<f64> {
+    let of_run = |run: &SensorRun| -> Option<Vec<f64>> {
+        let radii = run.channels()?.iter().map(|[x, y]| {
+            let z = hypothesis.unread(Envelope::new(*x, 0.0, *y, 0.0), &Moment::default());
+            z.x_c.hypot(z.y_c)
+        });
+        let radii: Vec<f64> = radii.collect();
+        let usual = median(&mut radii.clone());
+        Some(radii.into_iter().map(|r| r / usual - 1.0).collect())
+    };
+    let left: Vec<f64> = fitted.iter().map(of_run).collect::<Option<Vec<_>>>()?.concat();
+    Some(robust_deviation(left.into_iter())).filter(|left| left.is_finite())
 }
 
 /// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
@@ -221,6 +237,11 @@ pub(crate) fn report(
     let (mut reported, odd, temperature) =
         runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered], &mut warnings);
     let angular_gain = covering_all(&finding, &odd, &mut reported, &mut warnings);
+    let residual = residual_report(&errors.on_fit, discovered);
+    let mut unexplained = described(&effects, &finding);
+    if finding.readout.is_some() && fitted.iter().all(|run| run.commanded) {
+        unexplained.extend(against_a_command(&residual));
+    }
     let report = Report {
         schema: SCHEMA.into(),
         status: if neutral { Status::Neutral } else { Status::Answered },
@@ -232,11 +253,11 @@ pub(crate) fn report(
         angular_gain,
         detection_gain_ratio: finding.detection_gain_ratio.filter(|_| !neutral),
         actuation_gain_ratio: None,
-        unexplained: described(&effects, &finding),
+        unexplained,
         effects,
         heldout,
         steps,
-        residual: residual_report(&errors.on_fit, discovered),
+        residual,
         channels: Vec::new(),
         runs: reported,
         decomposition: finding.decomposition.clone(),

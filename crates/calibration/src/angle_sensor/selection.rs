@@ -13,7 +13,7 @@ use super::cross_validation::{
 use super::ellipse;
 use super::lines::{cover_a_turn, is_harmonic_of_table, strongest_and_its_aliases};
 use super::rails::Rails;
-use super::readout::{Kind, Readout, unknowns_of_texts};
+use super::readout::{Competing, Kind, Readout, unknowns_of_texts};
 use super::readout_fit::{ReadoutFit, Weighting, fit};
 use super::samples::{Reading, SensorRun};
 use super::sensor::Sensor;
@@ -87,8 +87,7 @@ pub(crate) struct Selection<'a> {
     folds: Folds,
     rails: Rails,
     starts: Vec<Readout>,
-    /// effects as text that compete
-    texts: Vec<EffectId>,
+    competing: Competing<'a>,
     /// directions of the sensor's period that rows stand in
     stations: usize,
     /// what each readout makes of the rows when it is fitted without each fold
@@ -109,7 +108,7 @@ impl<'a> Selection<'a> {
         fit_runs: &[SensorRun],
         rails: Rails,
         starts: &[Readout],
-        texts: &[EffectId],
+        competing: Competing<'a>,
         asked: &[f64],
     ) -> Self {
         let rows: usize = fit_runs.iter().map(SensorRun::len).sum();
@@ -117,9 +116,9 @@ impl<'a> Selection<'a> {
         let runs: Vec<SensorRun> =
             fit_runs.iter().map(|r| if stride > 1 { r.thinned(stride) } else { r.clone() }).collect();
         let folds = Folds::of(&runs, asked, sensor.gain.abs() * sensor.cycles);
-        let (starts, texts) = (starts.to_vec(), texts.to_vec());
+        let starts = starts.to_vec();
         let stations = stations(sensor, &runs);
-        Self { sensor, runs, folds, rails, starts, texts, stations, without: BTreeMap::new() }
+        Self { sensor, runs, folds, rails, starts, competing, stations, without: BTreeMap::new() }
     }
 
     /// Chooses a model, and after it a simpler one where that is as good within a wider tolerance; none where there is not
@@ -205,7 +204,7 @@ impl<'a> Selection<'a> {
     /// among themselves, so that they take no other's place.
     fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Vec<Option<Front>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
-        let mut fronts = vec![Some(PLAIN)];
+        let mut fronts = if self.sensor.free_gain && !self.raw_turns() { Vec::new() } else { vec![Some(PLAIN)] };
         if !self.starts.is_empty() {
             fronts.extend(self.fitted_fronts().into_iter().map(Some));
         }
@@ -234,18 +233,25 @@ impl<'a> Selection<'a> {
         finalists
     }
 
+    /// The raw angle may turn: the origin may lie within what the channels draw. One that does not, and an angular gain that is free, end at
+    /// a gain of nothing beside a table that takes the angle away.
+    fn raw_turns(&self) -> bool {
+        self.starts.is_empty() || self.starts.iter().any(Readout::is_about_the_origin)
+    }
+
     /// Readouts with something to fit, that what they are weighted by tells. Effects as text stand beside gain and skew at
     /// least, each by itself and all together.
     fn fitted_fronts(&self) -> Vec<Front> {
-        let kinds = Kind::FITTED.iter().flat_map(|k| Weighting::ALL.map(|w| (*k, w)));
+        let Competing { largest, texts } = self.competing;
+        let kinds = Kind::FITTED.iter().filter(|k| **k <= largest).flat_map(|k| Weighting::ALL.map(|w| (*k, w)));
         let told: Vec<_> = kinds.filter(|(kind, weighting)| kind.is_told_by(*weighting)).collect();
         // the radius alone does not tell what turns the vibration
         let beside_texts = |(kind, weighting): &&(Kind, Weighting)| {
             matches!(kind, Kind::Affine | Kind::Cubic) && *weighting != Weighting::Radius
         };
-        let mut sets: Vec<Vec<EffectId>> = self.texts.iter().map(|t| vec![*t]).collect();
-        if self.texts.len() > 1 {
-            sets.push(self.texts.clone());
+        let mut sets: Vec<Vec<EffectId>> = texts.iter().map(|t| vec![*t]).collect();
+        if texts.len() > 1 {
+            sets.push(texts.to_vec());
         }
         let with = |texts: Vec<EffectId>| {
             let told: Vec<_> = told.iter().filter(beside_texts).copied().collect();
@@ -569,7 +575,7 @@ mod tests {
         let across = |run: SensorRun| {
             let runs = [run];
             let sensor = Sensor { gain: 1.0, free_gain: false, period: std::f64::consts::TAU, cycles: 1.0 };
-            let selection = Selection::new(&sensor, &runs, Rails::none(), &[], &[], &[]);
+            let selection = Selection::new(&sensor, &runs, Rails::none(), &[], Competing::with(&[]), &[]);
             let long = Shape { form: Form::Own, order: 16, ..Shape::constant(false) };
             selection.across_gaps(&(None, long)).map(|(shape, _)| shape.order)
         };

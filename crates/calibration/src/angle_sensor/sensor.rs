@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
@@ -11,14 +11,24 @@ use super::units::{COUNTS, UNITS, Unit, by_gain, or_smaller};
 use crate::error::Refusal;
 use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{circular_mean, line, median};
+use crate::numerics::statistics::{circular_mean, line, median, root_mean_square, span};
 
 /// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one, and one
-/// up to so far from it where errors once and twice a turn could have made the difference.
+/// up to so far from it where errors of the position could have made the difference: where the slope beside them is told as well as is close,
+/// and is this close; or where it is not, and the line leaves this share at least of what it would be off by.
 const WHOLE: f64 = 0.02;
 const WHOLE_BESIDE_ERRORS: f64 = 0.05;
+const FARTHEST_FROM_WHOLE: f64 = 0.3;
+const WHOLE_SLOPE: f64 = 0.01;
+const FARTHEST_WHERE_NOT_TOLD: f64 = 0.1;
+const LEAST_LEFT_BY_A_LINE: f64 = 0.3;
 /// Standard errors within which a slope is what it could be (95 %).
 const BY_CHANCE: f64 = 2.0;
+/// Harmonics of the position beside a slope, at most, and rows for each.
+const MOST_HARMONICS: usize = 12;
+const ROWS_PER_HARMONIC: usize = 8;
+/// Rows beyond which every so many tell a slope.
+const ENOUGH_ROWS: usize = 4000;
 /// Samples whose circular mean begins the unwrapping of an error.
 const BEGINNING: usize = 50;
 
@@ -72,7 +82,7 @@ impl Sensor {
         let near = |reach: f64| (size - size.round()).abs() < reach && size > 0.5;
         let whole = match stated_gain {
             Some(_) => near(1e-9),
-            None => near(WHOLE) || (near(WHOLE_BESIDE_ERRORS) && could_be(size.round(), runs, period)),
+            None => near(WHOLE) || is_whole_beside_errors(size, runs, period),
         };
         let size = if whole { size.round() } else { size };
         let sensor = Self { gain: size, free_gain: !whole, period, cycles: TAU / period };
@@ -259,25 +269,51 @@ fn longest(runs: &[SensorRun], period: f64) -> Option<(&[f64], Vec<f64>)> {
     Some((&longest.reference_rad, unwrapped(theta.into_iter(), period)))
 }
 
-/// Whether |gain| could be `size`: by the slope of the followed angle beside errors once and twice a turn, which a line alone takes
-/// a share of where the reference turns little more than once.
-fn could_be(size: f64, runs: &[SensorRun], period: f64) -> bool {
-    let Some((reference, followed)) = longest(runs, period) else { return false };
-    let begin = reference.first().copied().unwrap_or(0.0);
-    let rows: Vec<SVector<f64, 6>> = reference
-        .iter()
-        .map(|a| {
-            let ([s1, c1], [s2, c2]) = ([a.sin(), a.cos()], [(2.0 * a).sin(), (2.0 * a).cos()]);
-            SVector::from([a - begin, 1.0, s1, c1, s2, c2])
-        })
-        .collect();
-    let normal: SMatrix<f64, 6, 6> = rows.iter().map(|r| r * r.transpose()).sum();
-    let right: SVector<f64, 6> = rows.iter().zip(&followed).map(|(r, f)| r * *f).sum();
-    let Some(inverse) = normal.try_inverse().filter(|_| rows.len() > 6) else { return false };
-    let x = inverse * right;
+/// Whether |gain|, which a line alone says is `size`, could be the whole number next to it: by the slope of the followed angle beside errors
+/// of the position, which a line takes a share of where the reference turns little more than once.
+fn is_whole_beside_errors(size: f64, runs: &[SensorRun], period: f64) -> bool {
+    let whole = size.round();
+    let off = (size - whole).abs();
+    let Some((reference, followed)) = longest(runs, period).filter(|_| size > 0.5 && off < FARTHEST_FROM_WHOLE) else {
+        return false;
+    };
+    let Some((slope, deviation)) = slope_beside_errors(reference, &followed) else { return false };
+    let by_chance = BY_CHANCE * deviation;
+    let apart = (slope - whole).abs();
+    if by_chance < WHOLE {
+        return apart < WHOLE_SLOPE.max(by_chance);
+    }
+    let tilt = off * span(reference) / 12f64.sqrt();
+    let could_be = apart <= by_chance && off < WHOLE_BESIDE_ERRORS;
+    could_be || (off < FARTHEST_WHERE_NOT_TOLD && left_by_a_line(reference, &followed) > LEAST_LEFT_BY_A_LINE * tilt)
+}
+
+/// What a line leaves of the followed angle, rad rms.
+fn left_by_a_line(reference: &[f64], followed: &[f64]) -> f64 {
+    let (slope, start) = line(reference, followed);
+    root_mean_square(&reference.iter().zip(followed).map(|(a, f)| f - start - slope * a).collect::<Vec<_>>())
+}
+
+/// The slope of the followed angle beside harmonics of the position, and its deviation.
+fn slope_beside_errors(reference: &[f64], followed: &[f64]) -> Option<(f64, f64)> {
+    let begin = reference.first().copied()?;
+    let stride = reference.len().div_ceil(ENOUGH_ROWS);
+    let harmonics = (reference.len() / stride / ROWS_PER_HARMONIC).clamp(2, MOST_HARMONICS);
+    let unknowns = 2 + 2 * harmonics;
+    let row = |a: f64| {
+        let of = |n: usize| <[f64; 2]>::from((n as f64 * a).sin_cos());
+        DVector::from_iterator(unknowns, [a - begin, 1.0].into_iter().chain((1..=harmonics).flat_map(of)))
+    };
+    let rows: Vec<DVector<f64>> = reference.iter().step_by(stride).map(|a| row(*a)).collect();
+    let followed: Vec<f64> = followed.iter().copied().step_by(stride).collect();
+    let mut normal = DMatrix::zeros(unknowns, unknowns);
+    rows.iter().for_each(|r| normal.ger(1.0, r, r, 1.0));
+    let right: DVector<f64> = rows.iter().zip(&followed).map(|(r, f)| r * *f).sum();
+    let inverse = normal.try_inverse().filter(|_| rows.len() > unknowns)?;
+    let x = &inverse * right;
     let left: f64 = rows.iter().zip(&followed).map(|(r, f)| (f - r.dot(&x)).powi(2)).sum();
-    let deviation = (left / (rows.len() - 6) as f64 * inverse[(0, 0)]).max(0.0).sqrt();
-    (x[0].abs() - size).abs() <= BY_CHANCE * deviation
+    let deviation = (left / (rows.len() - unknowns) as f64 * inverse[(0, 0)]).max(0.0).sqrt();
+    Some((x[0].abs(), deviation))
 }
 
 #[cfg(test)]

@@ -232,6 +232,11 @@ impl TableFit {
         sound.then_some(fitted)
     }
 
+    /// By how much the angular gain was adjusted.
+    pub(crate) fn moved_gain(&self) -> f64 {
+        if self.shape.free_gain { self.side[self.shape.motion.size()] } else { 0.0 }
+    }
+
     /// Takes a line for nothing.
     pub(crate) fn without_line(&mut self, at: usize) {
         let first = self.shape.side() - 2 * (self.shape.lines.len() - at);

@@ -10,7 +10,7 @@ use crate::data::held_reference;
 use crate::data::interpolated;
 use crate::data::rail::rows_at_rails;
 use crate::data::references::references;
-use crate::data::{quadrature_spikes, rate_spikes};
+use crate::data::{leaping_rows, rate_spikes};
 use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording, Run};
 
@@ -38,6 +38,8 @@ pub(crate) struct Findings {
     pub(crate) broken: Option<Broken>,
     /// by which share table and rate differ, where they do
     pub(crate) references_apart: f64,
+    /// rows in which a channel leapt
+    pub(crate) spikes: usize,
 }
 
 /// Why a recording serves for nothing.
@@ -58,7 +60,10 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let name = recording.source.display().to_string();
     findings.warnings.extend(held_reference::go_on_evenly(recording));
     rate_spikes::leave_out(recording, &name, &mut findings.warnings);
-    findings.warnings.extend(quadrature_spikes::mend(recording));
+    if let Some((rows, said)) = leaping_rows::mend(recording) {
+        findings.spikes = rows;
+        findings.warnings.push(said);
+    }
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
         Err(broken) => {

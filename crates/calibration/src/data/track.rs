@@ -102,13 +102,31 @@ impl Track {
                 "a rate other than zero",
             ));
         }
-        track.segments = segments(&track.t_s, settled, role, split);
+        track.segments = segments(&track.t_s, settled, role);
+        if split {
+            track.hold_out_the_end();
+        }
         if track.segments.is_empty() {
             return Err(Refusal::new(&name, "too few samples are left after settling", "a longer run"));
         }
         let resolved = track.resolved(LARGEST_FIRST_TURN, track.mean_speed());
         track.stride = (track.t_s.len() / ENOUGH_SAMPLES).min(resolved).max(1);
         Ok(track)
+    }
+
+    /// Holds out the last quarter.
+    pub(crate) fn hold_out_the_end(&mut self) {
+        let Some((first, last)) = self.segments.first().zip(self.segments.last()) else { return };
+        let [from, to] = [first.range.start, last.range.end - 1].map(|i| self.t_s[i]);
+        let cut = from + FITTED_SHARE * (to - from);
+        let parts = |segment: &Segment| {
+            let Range { start, end } = segment.range;
+            let middle = start + self.t_s[start..end].partition_point(|t| *t < cut);
+            let fitted = Segment { range: start..middle, role: segment.role };
+            [fitted, Segment { range: middle..end, role: Role::Holdout }]
+        };
+        let parts = self.segments.iter().flat_map(parts);
+        self.segments = parts.filter(|part| part.range.len() >= SHORTEST_SEGMENT).collect();
     }
 
     /// The number of sampling intervals in which what turns at `speed_rad_s` turns by `turn_rad`, at least one.
@@ -459,22 +477,18 @@ fn thinned(v: &[f64], i: usize, width: usize) -> f64 {
     centre - alpha * (near - 2.0 * centre) + (alpha / 12.0 + alpha * alpha - beta) * (far - 4.0 * near + 6.0 * centre)
 }
 
-/// Cuts a run at its gaps and, where `split` is set, at the start of its held-out quarter.
-fn segments(t: &[f64], settled: Range<usize>, role: Role, split: bool) -> Vec<Segment> {
+/// Cuts a run at its gaps.
+fn segments(t: &[f64], settled: Range<usize>, role: Role) -> Vec<Segment> {
     let mut steps: Vec<f64> = settled.clone().skip(1).map(|i| t[i] - t[i - 1]).collect();
     if steps.is_empty() {
         return Vec::new();
     }
     let middle = steps.len() / 2;
     let (_, &mut interval, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let cut = t[settled.start] + FITTED_SHARE * (t[settled.end - 1] - t[settled.start]);
     let mut out = Vec::new();
     let mut start = settled.start;
     for i in settled.clone().skip(1).chain([settled.end]) {
-        let ends =
-            i == settled.end || t[i] - t[i - 1] > GAP_INTERVALS * interval || (split && t[i - 1] < cut && t[i] >= cut);
-        if ends {
-            let role = if split && t[start] >= cut { Role::Holdout } else { role };
+        if i == settled.end || t[i] - t[i - 1] > GAP_INTERVALS * interval {
             if i - start >= SHORTEST_SEGMENT {
                 out.push(Segment { range: start..i, role });
             }

@@ -243,7 +243,8 @@ const LARGEST_PHASE_STEP: f64 = 0.5;
 
 /// The input angle that the input effects add between two samples, rad, with slopes against a group of lanes: two-point Gauss quadrature on
 /// pieces over which the table's harmonic turns little. Between samples the table turns evenly but for what the effects
-/// add, `excess` up to the first of them: a ripple of the rate goes by the angle that it made itself.
+/// add, `excess` up to the first of them: a ripple of the rate goes by the angle that it made itself, an error of the table's own angle
+/// by what was read of it.
 fn excess_angle(
     track: &Track,
     (from, excess): (usize, f64),
@@ -257,13 +258,14 @@ fn excess_angle(
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive count, saturating")]
     let pieces = ((harmonic * (a1 - a0).abs() / LARGEST_PHASE_STEP).ceil() as usize).clamp(1, 10_000);
     let h = 1.0 / pieces as f64;
+    let made = |so_far: f64| if track.has_table { 0.0 } else { excess + 0.5 * h * (t1 - t0) * so_far };
     let mut sum = Jet::constant(0.0);
     for piece in 0..pieces {
         for node in [-0.5 / 3f64.sqrt(), 0.5 / 3f64.sqrt()] {
             let s = h * (piece as f64 + 0.5 + node);
             let at = Moment {
                 t_s: t0 + s * (t1 - t0),
-                table_rad: a0 + s * (a1 - a0) + excess + 0.5 * h * (t1 - t0) * sum.value,
+                table_rad: a0 + s * (a1 - a0) + made(sum.value),
                 precession_rad_s: predictor.hypothesis.precession(rate),
                 warmer_k: (1.0 - s) * track.warmer_k(from) + s * track.warmer_k(to),
                 ..Moment::default()

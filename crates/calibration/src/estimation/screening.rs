@@ -45,6 +45,8 @@ pub(crate) struct Screen {
     /// numbers of those that are not
     pub(crate) left_out: Vec<usize>,
     rotations: usize,
+    /// rows of each rotation run in which a channel leapt
+    spikes: Vec<usize>,
     /// by which share the references of every fitted run differ, that of the run where they differ least
     pub(crate) references_apart: f64,
 }
@@ -101,6 +103,11 @@ impl Screen {
         Self { stated, kept: (0..rotations).collect(), rotations, ..Self::default() }
     }
 
+    /// Rows in which a channel leapt, of the runs that are in.
+    pub(crate) fn spikes(&self) -> impl Iterator<Item = usize> {
+        self.kept.iter().map(|number| self.spikes.get(*number).copied().unwrap_or(0))
+    }
+
     /// The angular gain that the campaign states.
     pub(crate) fn stated(&self) -> Option<f64> {
         self.stated
@@ -138,6 +145,7 @@ impl Screen {
         for (number, mut run) in runs.into_iter().enumerate() {
             let findings = mend(&mut run.recording);
             warnings.extend(findings.warnings);
+            self.spikes.push(findings.spikes);
             match findings.broken {
                 Some(what) => broken.push((number, run_name(&run), what)),
                 None => {
@@ -270,7 +278,17 @@ impl Screen {
             let problem = format!("the pattern turns through {:.1}° only", motion.travel.to_degrees());
             Err(Refusal::new(&track.name, problem, "at least half a turn (180°)"))
         };
-        self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)
+        let mut ready = self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)?;
+        if ready.iter().all(|(track, _)| track.samples(Role::Holdout) == 0) {
+            warnings.push(
+                "no run that was to be held out is left: the last quarter of each of the others is held out".into(),
+            );
+            for (track, moves) in &mut ready {
+                track.hold_out_the_end();
+                *moves = motion(track, start, guess)?;
+            }
+        }
+        Ok(ready)
     }
 
     /// The runs without those at these places.

@@ -226,7 +226,9 @@ impl Found {
             warnings.push(format!("{all_spikes} samples were set aside as spikes"));
         }
         warnings.extend(tell_apart(&mut runs, &self.dataset, fit, (&self.errors.on_fit, after)));
-        for ((run, t), spikes) in self.dataset.screen.of(&mut runs).into_iter().zip(&self.dataset.tracks).zip(spikes) {
+        let screen = &self.dataset.screen;
+        let spikes = spikes.into_iter().zip(screen.spikes()).map(|(set_aside, mended)| set_aside + mended);
+        for ((run, t), spikes) in screen.of(&mut runs).into_iter().zip(&self.dataset.tracks).zip(spikes) {
             run.spikes = spikes;
             run.rate_dps = Some(t.track.mean_rate().to_degrees());
             run.r#use = match (t.track.samples(Role::Fit) > 0, t.track.samples(Role::Holdout) > 0) {

@@ -40,6 +40,8 @@ const LARGEST_LEFT_IN_THE_RADIUS: f64 = 0.02;
 const MIRRORED: f64 = 0.5;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
+/// … where the radius is not within this factor of what the calibration left of it where it was made.
+const AS_CALIBRATED: f64 = 2.0;
 
 /// Refuses a recording of another instrument.
 ///
@@ -89,7 +91,8 @@ pub(crate) fn require_of_the_calibrated(
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     if h.instrument == Instrument::Sensor && channels && goes_round {
         let [before, after] = [0, 1].map(|i| 100.0 * radius_error(rows, i));
-        if after > WORSE * before {
+        let as_calibrated = 100.0 * AS_CALIBRATED * calibration.provenance.radius_left.unwrap_or(0.0);
+        if after > WORSE * before && after > as_calibrated {
             let problem =
                 format!("with the calibration undone its radius is off by {after:.2} %, as recorded by {before:.2} %");
             return refuse(problem, None);
@@ -132,7 +135,8 @@ fn roughness(rows: &[Row], period: f64) -> f64 {
 }
 
 /// What a sensor's radius still does with its angle although its readout is undone, in words; none where that is little.
-pub(crate) fn left_in_the_radius(h: &Hypothesis, rows: &[Row]) -> Option<String> {
+pub(crate) fn left_in_the_radius(calibration: &Calibration, rows: &[Row]) -> Option<String> {
+    let h = &calibration.hypothesis;
     let reads = |id: EffectId| matches!(id, EffectId::DetectionOffset | EffectId::DetectionGainMismatch);
     let corrected = h.members.iter().any(|m| reads(m.id));
     if h.instrument != Instrument::Sensor || !corrected || !goes_round(rows, h.period_rad) {
@@ -145,7 +149,9 @@ pub(crate) fn left_in_the_radius(h: &Hypothesis, rows: &[Row]) -> Option<String>
         equations.add(&[1.0, c1, s1, c2, s2], r.radius[1] / usual);
     }
     let share = equations.solve()[1..].iter().fold(0.0, |sum: f64, a| sum.hypot(*a));
-    (share > LARGEST_LEFT_IN_THE_RADIUS).then(|| {
+    // a wave of this robust deviation has an amplitude √2 times as large
+    let as_calibrated = AS_CALIBRATED * std::f64::consts::SQRT_2 * calibration.provenance.radius_left.unwrap_or(0.0);
+    (share > LARGEST_LEFT_IN_THE_RADIUS.max(as_calibrated)).then(|| {
         format!(
             "with the calibration undone its radius still goes with its angle by {:.1} %: a recording of another sensor than \
              the calibrated one, or that one has changed",

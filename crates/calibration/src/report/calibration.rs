@@ -57,6 +57,8 @@ pub struct Provenance {
     /// where in the sensor's period the rows stood that a table was made of, from and to, deg of its own angle; none where that is all of
     /// it, or there is no table
     pub covered_deg: Option<[f64; 2]>,
+    /// robust deviation of the radius of the rows that a sensor's readout was made of, with it undone, as a share; none where there is none
+    pub radius_left: Option<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -80,6 +82,8 @@ struct File {
     readout_unit: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     covered_deg: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    radius_left: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     temperature_c: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -148,6 +152,7 @@ impl Calibration {
             amplitude_v: self.provenance.amplitude_v,
             readout_unit: self.provenance.readout_unit.clone(),
             covered_deg: self.provenance.covered_deg,
+            radius_left: self.provenance.radius_left,
             temperature_c: h.reference_c,
             tool: self.provenance.tool.clone(),
             input: self.provenance.inputs.clone(),
@@ -219,6 +224,7 @@ impl Calibration {
             amplitude_v: file.amplitude_v,
             readout_unit: file.readout_unit,
             covered_deg: file.covered_deg,
+            radius_left: file.radius_left,
         };
         Ok(Self { device: file.device, hypothesis, provenance })
     }

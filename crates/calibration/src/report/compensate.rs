@@ -3,7 +3,7 @@
 
 use cvg_model::effects::{EffectId, Stage};
 
-use crate::data::quadrature_spikes;
+use crate::data::leaping_rows;
 use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::propagation::{Start, Stepping, propagate};
@@ -55,7 +55,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     needs_no_reference(h, rated.as_ref().unwrap_or(recording))?;
     needs_no_temperature(h, recording)?;
     let mut read = rated.unwrap_or_else(|| recording.clone());
-    let leaps = quadrature_spikes::mend(&mut read);
+    let leaps = leaping_rows::mend(&mut read);
     let run = Run {
         kind: RunKind::Rotation,
         file: recording.source.clone(),
@@ -69,7 +69,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         track.refer_to(reference_c);
     }
     let mut out = recording.clone();
-    out.warnings.extend(leaps);
+    out.warnings.extend(leaps.map(|(_, said)| said));
     let mut angle_rad: Vec<f64> = Vec::new();
     let mut rows = Vec::with_capacity(recording.len());
     let first_s = recording.t_s.first().copied().unwrap_or(0.0);
@@ -112,7 +112,7 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         });
     }
     require_of_the_calibrated(calibration, recording, &rows)?;
-    if let Some(left) = left_in_the_radius(h, &rows).filter(|_| channels) {
+    if let Some(left) = left_in_the_radius(calibration, &rows).filter(|_| channels) {
         out.warnings.push(format!("{}: {left}", recording.source.display()));
     }
     if let Some(said) = counts_the_other_way(h, recording, &rows) {

@@ -10,7 +10,7 @@ use crate::diagnostics::residual::{
 use crate::estimation::joint_fit::Dataset;
 use crate::facts::Follows;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
-use crate::report::{Heldout, ResidualReport, Unexplained};
+use crate::report::{Harmonic, Heldout, ResidualReport, Unexplained};
 use crate::selection::step::Step;
 
 /// A line's power over the mean square of the residual, from which it is no accident among those that were looked at:
@@ -25,6 +25,8 @@ const SMALLEST_SHARE: f64 = 0.2;
 const DRIFTS: f64 = 0.4;
 /// The residual may exceed its white part by this factor before "other" is said.
 const LARGEST_EXCESS: f64 = 1.3;
+/// Harmonics of an angle against a command that are listed at most.
+const MOST_HARMONICS: usize = 4;
 
 /// What is left after all: its harmonics on the held-out samples, and whether the fitted ones remember anything.
 pub(crate) fn residual_report(on_fit: &Evaluation, held_out: &Evaluation) -> ResidualReport {
@@ -34,6 +36,25 @@ pub(crate) fn residual_report(on_fit: &Evaluation, held_out: &Evaluation) -> Res
         harmonics: [Follows::Pattern, Follows::Table].into_iter().flat_map(harmonics).collect(),
         white: ljung_box(&memory, on_fit.errors().count()) >= WHITENESS_LEVEL,
     }
+}
+
+/// Harmonics of the pattern that are left of an angle against a reference that was commanded, and were not corrected: the largest first.
+pub(crate) fn against_a_command(residual: &ResidualReport) -> Vec<Unexplained> {
+    let is_seen = |h: &&Harmonic| h.of == Follows::Pattern && h.amplitude_deg > h.ci95_deg;
+    let mut seen: Vec<&Harmonic> = residual.harmonics.iter().filter(is_seen).collect();
+    seen.sort_by(|a, b| b.amplitude_deg.total_cmp(&a.amplitude_deg));
+    let said = |h: &Harmonic| {
+        Unexplained {
+        class: "pattern-harmonic".into(),
+        n: Some(h.n),
+        frequency_hz: None,
+        rms_deg: h.amplitude_deg / std::f64::consts::SQRT_2,
+        suggestion: "the sensor's or the drive's, which a commanded reference does not tell apart, and not corrected; record table_deg, \
+                     or state reference = \"measured\" in campaign.toml where the rate was kept"
+            .into(),
+    }
+    };
+    seen.into_iter().take(MOST_HARMONICS).map(said).collect()
 }
 
 /// What was corrected and not explained.

@@ -1,0 +1,237 @@
+//! Rows whose channels leap: no vibration does for a row or two, but numbers are damaged so. The angle of such a row is off and can be
+//! set aside; what a split of the frequencies makes of its quadrature and amplitude would stay in the angle to the end of the recording.
+//!
+//! A value is compared with the cubic through two rows before and two after it. One that leaps pulls those about it off their own
+//! cubics, so that rows are looked at in clusters, and taken out one by one, the furthest first, until the rest is smooth.
+
+use std::ops::Range;
+
+use crate::data::plausibility::{places, stretches};
+use crate::numerics::statistics::median;
+use crate::recording::{Channel, Recording};
+
+/// A value leaps by this many times what is usual, which is this often what [`USUAL`] of all values are off their cubics at the most.
+const LEAP: f64 = 12.0;
+const USUAL: f64 = 0.9;
+const TAIL: f64 = 1.5;
+/// … at either end, where a cubic is gone on with, this many times as far.
+const AT_AN_END: f64 = 4.0;
+/// Rows before and after that say what a value should be, and how many usual intervals all of them may span.
+const BESIDE: usize = 2;
+const SPAN: f64 = 10.0;
+/// What leads to a leap from before and from after is the same within this share of it: it is no step.
+const BACK: f64 = 0.2;
+/// So many rows in a row leap at the most, and of a cluster this share and one.
+const LONGEST: usize = 2;
+const OF_A_CLUSTER: usize = 3;
+
+/// Puts into rows in which a channel of the vibration leaps what lies between those beside them; how many they are, and what to say of
+/// them. The row stays: its rate belongs to the angle of the reference.
+pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
+    let channels = [Channel::Xc, Channel::Yc, Channel::Xs, Channel::Ys];
+    let mut leaping = vec![false; recording.len()];
+    for channel in channels {
+        let Some(mut values) = recording.channel(channel).map(<[f64]>::to_vec) else { continue };
+        let leaps = Column { t_s: &recording.t_s, values: &values }.leaps();
+        for (i, value) in leaps {
+            values[i] = value;
+            leaping[i] = true;
+        }
+        recording.set_channel(channel, values);
+    }
+    let rows = stretches(leaping.len(), |i| leaping[i]);
+    let count: usize = rows.iter().map(Range::len).sum();
+    let said = || {
+        format!(
+            "{}: a channel leaps for single rows, which no vibration does: {}; {count} rows are spikes, and take what lies between those \
+             beside them",
+            recording.source.display(),
+            places(&recording.t_s, &rows)
+        )
+    };
+    (count > 0).then(|| (count, said()))
+}
+
+/// A channel over time.
+struct Column<'a> {
+    t_s: &'a [f64],
+    values: &'a [f64],
+}
+
+impl Column<'_> {
+    /// The rows that leap, and what lies between those beside them.
+    fn leaps(&self) -> Vec<(usize, f64)> {
+        let n = self.values.len();
+        let mut intervals: Vec<f64> = self.t_s.windows(2).map(|t| t[1] - t[0]).collect();
+        // a digit more or less is no leap
+        let steps = self.values.windows(2).map(|v| (v[1] - v[0]).abs());
+        let digit = steps.filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
+        if n <= 4 * BESIDE || digit.is_infinite() {
+            return Vec::new();
+        }
+        let usual_s = median(&mut intervals);
+        let off = |i: usize, out: &[usize]| self.off(i, out, SPAN * usual_s);
+        let own: Vec<f64> = (0..n).map(|i| off(i, &[])).collect();
+        let mut sorted = own.clone();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the rows")]
+        let at = (USUAL * (n - 1) as f64) as usize;
+        let limit = LEAP * (TAIL * *sorted.select_nth_unstable_by(at, f64::total_cmp).1).max(digit);
+        let mut found = Vec::new();
+        for cluster in clusters(&own, limit) {
+            let Some(leaping) = leaping(cluster, limit, off) else { continue };
+            let goes_back = |i: &usize| self.goes_back(*i, &leaping);
+            if leaping.iter().all(goes_back) {
+                found.extend(leaping.iter().map(|i| (*i, self.between(*i, &leaping))));
+            }
+        }
+        found
+    }
+
+    /// By how much a value is off what those beside it say without rows that are `out`; nothing where they are far apart.
+    fn off(&self, i: usize, out: &[usize], widest_s: f64) -> f64 {
+        let beside = self.beside(i, out);
+        let times = || beside.iter().chain([&i]).map(|j| self.t_s[*j]);
+        let span = times().fold(f64::MIN, f64::max) - times().fold(f64::MAX, f64::min);
+        if span > widest_s {
+            return 0.0;
+        }
+        let is_an_end = i < BESIDE || i + BESIDE >= self.values.len();
+        let factor = if is_an_end { AT_AN_END } else { 1.0 };
+        (self.values[i] - self.through(&beside, self.t_s[i])).abs() / factor
+    }
+
+    /// The nearest rows before and after one that are not `out`, in their order; at an end more of the other side.
+    fn beside(&self, i: usize, out: &[usize]) -> [usize; 2 * BESIDE] {
+        let n = self.values.len();
+        let mut before = (0..i).rev().filter(|j| !out.contains(j));
+        let mut after = (i + 1..n).filter(|j| !out.contains(j));
+        let mut beside = [i; 2 * BESIDE];
+        for pair in beside.chunks_exact_mut(2) {
+            let (left, right) = (before.next(), after.next());
+            pair[0] = left.or_else(|| after.nth(0)).unwrap_or(i);
+            pair[1] = right.or_else(|| before.nth(0)).unwrap_or(i);
+        }
+        beside.sort_unstable();
+        beside
+    }
+
+    /// The polynomial through some rows, at a time.
+    fn through(&self, rows: &[usize], t: f64) -> f64 {
+        let weight = |j: &usize| -> f64 {
+            let others = rows.iter().filter(|k| *k != j);
+            others.map(|k| (t - self.t_s[*k]) / (self.t_s[*j] - self.t_s[*k])).product()
+        };
+        rows.iter().map(|j| weight(j) * self.values[*j]).sum()
+    }
+
+    fn between(&self, i: usize, out: &[usize]) -> f64 {
+        self.through(&self.beside(i, out), self.t_s[i])
+    }
+
+    /// Whether the rows before and those after one lead to the same, beside which it leaps.
+    fn goes_back(&self, i: usize, out: &[usize]) -> bool {
+        let (before, after): (Vec<usize>, Vec<usize>) = self.beside(i, out).iter().partition(|j| **j < i);
+        if before.len() != after.len() {
+            return true;
+        }
+        let [from, to] = [before, after].map(|rows| self.through(&rows, self.t_s[i]));
+        (to - from).abs() < BACK * (self.values[i] - 0.5 * (from + to)).abs()
+    }
+}
+
+/// Rows that are off by more than `limit`, with those that could have pulled them.
+fn clusters(off: &[f64], limit: f64) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for i in (0..off.len()).filter(|i| off[*i] > limit) {
+        let (start, end) = (i.saturating_sub(BESIDE), (i + BESIDE + 1).min(off.len()));
+        match out.last_mut() {
+            Some(last) if last.end >= start => last.end = end,
+            _ => out.push(start..end),
+        }
+    }
+    out
+}
+
+/// The rows of a cluster without which the rest is smooth; none where that takes too many.
+fn leaping(cluster: Range<usize>, limit: f64, off: impl Fn(usize, &[usize]) -> f64) -> Option<Vec<usize>> {
+    let most = 1 + cluster.len() / OF_A_CLUSTER;
+    let mut out: Vec<usize> = Vec::new();
+    loop {
+        let left = cluster.clone().filter(|i| !out.contains(i)).map(|i| (off(i, &out), i));
+        match left.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((worst, _)) if worst > limit && out.len() == most => return None,
+            Some((worst, i)) if worst > limit => out.push(i),
+            _ => break,
+        }
+    }
+    // between two that leap stands the one that is off the most
+    for i in out.clone() {
+        let others: Vec<usize> = out.iter().copied().filter(|j| *j != i).collect();
+        if off(i, &others) <= limit {
+            out = others;
+        }
+    }
+    let longest = stretches(cluster.end, |i| out.contains(&i)).iter().map(Range::len).max();
+    (longest <= Some(LONGEST)).then_some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel of a pattern that turns, with noise, in whole digits.
+    fn channel(turn: f64, noise: f64, digit: f64) -> Vec<f64> {
+        let of = |i: f64| (turn * i).sin() + noise * (i * i).sin();
+        (0..3000).map(|i| (of(f64::from(i)) / digit).round() * digit).collect()
+    }
+
+    fn leaps(values: &[f64]) -> Vec<usize> {
+        let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
+        Column { t_s: &t_s, values }.leaps().into_iter().map(|(i, _)| i).collect()
+    }
+
+    #[test]
+    fn a_leap_is_found_in_noise_and_in_digits_and_a_step_is_none() {
+        for (turn, noise, digit) in [(0.13, 2e-5, 1e-9), (0.13, 2e-5, 1e-3), (0.01, 1e-3, 5e-2), (0.3, 1e-5, 1e-9)] {
+            let mut values = channel(turn, noise, digit);
+            assert_eq!(leaps(&values), [], "{turn} {digit}");
+            // far apart, side by side, with one between, with three
+            let damaged = [300, 700, 701, 1200, 1202, 1500, 1504];
+            damaged.iter().for_each(|at| values[*at] += if at % 5 == 0 { 1.7 } else { -1.1 });
+            assert_eq!(leaps(&values), damaged, "{turn} {digit}");
+        }
+        let step = |i: i32| if i < 1000 { 0.1 } else { -0.1 } + 1e-6 * f64::from(i % 7);
+        assert_eq!(leaps(&(0..3000).map(step).collect::<Vec<_>>()), []);
+        assert_eq!(leaps(&[0.0; 100]), []);
+        let from_station_to_station = |i: i32| f64::from(i / 40) * 0.3 + 1e-5 * f64::from(i % 7);
+        assert_eq!(leaps(&(0..3000).map(from_station_to_station).collect::<Vec<_>>()), []);
+    }
+
+    #[test]
+    fn either_end_leaps_as_well() {
+        let mut values = channel(0.13, 2e-5, 1e-9);
+        values[0] = 5.0;
+        values[2999] = -5.0;
+        assert_eq!(leaps(&values), [0, 2999]);
+    }
+
+    #[test]
+    fn a_row_that_leaps_takes_what_lies_between_those_beside_it() {
+        let mut recording = Recording {
+            t_s: (0..3000).map(f64::from).collect(),
+            xc_v: Some(channel(0.13, 2e-5, 1e-9)),
+            ys_v: Some(channel(0.13, 2e-5, 1e-9)),
+            ..Recording::default()
+        };
+        let sound = recording.clone();
+        assert_eq!(mend(&mut recording), None);
+        recording.xc_v.as_mut().into_iter().for_each(|xc| xc[900] = 0.5);
+        recording.ys_v.as_mut().into_iter().for_each(|ys| ys[1700] = -4.5);
+        assert!(mend(&mut recording).is_some_and(|(rows, said)| rows == 2 && said.contains("2 rows are spikes")));
+        for channel in [Channel::Xc, Channel::Ys] {
+            let (is, was) =
+                (recording.channel(channel).unwrap_or_default(), sound.channel(channel).unwrap_or_default());
+            assert!(is.iter().zip(was).all(|(is, was)| (is - was).abs() < 2e-4), "{channel:?}");
+        }
+    }
+}
