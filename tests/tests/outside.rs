@@ -157,6 +157,28 @@ fn a_table_with_sixteen_teeth_is_described_and_not_explained() {
     is_proposed(&identified, "table", Some(16.0), "input", [Some(0.0), Some(0.0)]);
 }
 
+/// A table's own angle with an encoder that errs: as a ripple of the rate it slowed the mean, k was high by half its square (12 half widths at an
+/// eccentricity of 0.2°), and of 36 a turn twenty floors were left.
+#[test]
+fn an_encoder_of_the_table_that_errs_is_no_ripple_of_its_rate() {
+    for (n, error_deg) in [(1.0, 0.2), (36.0, 0.05)] {
+        let folder = written(&scenario(plain_paper()).simulate());
+        let open = || Campaign::open(&folder.path().join("campaign.toml")).unwrap();
+        let k = identify(open(), &Options::default()).unwrap().report.angular_gain;
+        let mut campaign = open();
+        for run in campaign.runs.iter_mut().filter(|r| r.recording.rate_dps.is_some()) {
+            let rate = run.recording.rate_dps.take().unwrap()[0];
+            let read = |t: &f64| rate * t + error_deg * (n * rate * t + 30.0).to_radians().sin();
+            run.recording.table_deg = Some(run.recording.t_s.iter().map(read).collect());
+        }
+        let i = identify(campaign, &Options::default()).unwrap();
+        assert!(over_floor(&i) < CORRECTED, "{n}: {} × floor", over_floor(&i));
+        let told = i.report.angular_gain;
+        assert!((told.value - k.value).abs() < told.half_width() + k.half_width(), "{n}: {told:?} and {k:?}");
+        assert!((told.value - k.value).abs() < 1e-6, "{n}: {told:?} and {k:?}");
+    }
+}
+
 #[test]
 fn a_bearing_of_the_table_is_described_and_not_explained() {
     let identified = with_error(plain_paper(), |s| SIZE * (3.57 * s.table + 0.7).sin());

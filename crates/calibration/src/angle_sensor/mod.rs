@@ -15,6 +15,7 @@ mod jumps;
 pub(crate) mod likeness;
 mod lines;
 pub(crate) mod model;
+mod next_harmonics;
 mod odd_runs;
 mod pattern_or_rate;
 mod rails;

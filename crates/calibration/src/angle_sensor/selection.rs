@@ -188,7 +188,11 @@ impl<'a> Selection<'a> {
             let Some(better) = self.with_a_line(&chosen) else { break };
             chosen = better;
         }
-        chosen
+        self.with_its_next_harmonics(chosen)
+    }
+
+    pub(super) fn cycles_per_turn(&self) -> f64 {
+        self.sensor.cycles_per_turn()
     }
 
     fn losses_of(&mut self, front: &Option<Front>, shape: &Shape) -> Option<Losses> {
@@ -347,7 +351,7 @@ impl<'a> Selection<'a> {
             && passes.iter().map(|passes| about_mean(passes)).sum::<f64>() > LEAST_OF_ITS_OWN * about_mean(&rows)
     }
 
-    fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {
+    pub(super) fn shapes(&self, orders: &[usize], motions: &[Motion], lines: &[u32]) -> Vec<Shape> {
         let mut out = Vec::new();
         for &order in orders {
             for form in [Form::Own, Form::Forward].into_iter().take(if order == 0 { 1 } else { 2 }) {
@@ -360,7 +364,7 @@ impl<'a> Selection<'a> {
     }
 
     /// Cross-validates every readout with every shape that the rows can carry.
-    fn offer(&mut self, fronts: &[Option<Front>], shapes: &[Shape]) -> Vec<Candidate<Model>> {
+    pub(super) fn offer(&mut self, fronts: &[Option<Front>], shapes: &[Shape]) -> Vec<Candidate<Model>> {
         let missing: Vec<_> = fronts.iter().filter(|f| !self.without.contains_key(f)).cloned().collect();
         let fitted: Vec<_> = missing.into_par_iter().map(|f| (f.clone(), self.fit_without_each_fold(&f))).collect();
         self.without.extend(fitted);
@@ -438,8 +442,8 @@ impl<'a> Selection<'a> {
             ORDERS.into_iter().filter(|n| *n <= shape.order.max(ORDER_BESIDE_LINES)).chain([shape.order]).collect();
         orders.sort_unstable();
         orders.dedup();
-        let lines = strongest_and_its_aliases(&samples, &table, self.sensor.cycles_per_turn());
-        let cycles = self.sensor.cycles_per_turn();
+        let cycles = self.cycles_per_turn();
+        let lines = strongest_and_its_aliases(&samples, &table, cycles);
         let mut with: Vec<Candidate<Model>> = lines
             .into_iter()
             .filter_map(|line| {
