@@ -138,11 +138,12 @@ pub(crate) fn identify(
             }
         }
     }
-    if held.iter().map(SensorRun::len).sum::<usize>() < least_held_out(instrument) {
+    let (left, needed) = (held.iter().map(SensorRun::len).sum::<usize>(), least_held_out(instrument));
+    if left < needed {
         return Err(Refusal::no_answer(
             "campaign",
-            "too few rows are left to test an answer on",
-            "a longer recording, or a run with use = \"holdout\"",
+            format!("{left} held-out rows are left to test an answer on, and {needed} are needed"),
+            "a longer recording, or a longer run with use = \"holdout\"",
         ));
     }
     (options.progress)("choosing a model of the sensor");

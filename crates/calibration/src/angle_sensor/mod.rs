@@ -2,6 +2,7 @@
 //! encoders, magnetometers, interferometers.
 mod agreement;
 mod autoregression;
+mod calibrated_rows;
 mod circle;
 mod cross_axis;
 mod cross_validation;

@@ -1,14 +1,11 @@
 //! The report of a sensor or a rate gyroscope: the held-out error at each stage, what is left, and the facts of what was
 //! found, in the form that all instruments share.
 
-use cvg_model::Envelope;
-use cvg_model::effects::Moment;
-
+use super::calibrated_rows::{covered_deg, radius_left};
 use super::curve::Curve;
-use super::gap::Gap;
 use super::rate_alone::Alone;
 use super::readout::Readout;
-use super::samples::{Reading, SensorRun};
+use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::{PlotData, plots_of};
@@ -20,7 +17,7 @@ use crate::facts::Follows;
 use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, robust_deviation, root_mean_square};
+use crate::numerics::statistics::{median, root_mean_square};
 use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
@@ -105,33 +102,6 @@ impl Head {
         };
         Calibration { device: self.device, hypothesis, provenance }
     }
-}
-
-/// Where in the sensor's period rows stood that a table was made of, from and to, deg of its own angle; `None` where that is all of it.
-fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<[f64; 2]> {
-    hypothesis.angle_table.as_ref()?;
-    let read = |x, y| hypothesis.bearing(&hypothesis.unread(Envelope::new(x, 0.0, y, 0.0), &Moment::default()));
-    let angles = fitted.iter().flat_map(|run| match &run.reading {
-        Reading::Angle(theta) => theta.clone(),
-        Reading::Channels(channels) => channels.iter().map(|[x, y]| read(*x, *y)).collect(),
-    });
-    let covered = Gap::of(angles, std::f64::consts::TAU / hypothesis.period_rad)?.covered();
-    Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
-}
-
-/// What is left of the radius of the fitted rows, of each run about its median, as a robust deviation and a share.
-fn radius_left(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<f64> {
-    let of_run = |run: &SensorRun| -> Option<Vec<f64>> {
-        let radii = run.channels()?.iter().map(|[x, y]| {
-            let z = hypothesis.unread(Envelope::new(*x, 0.0, *y, 0.0), &Moment::default());
-            z.x_c.hypot(z.y_c)
-        });
-        let radii: Vec<f64> = radii.collect();
-        let usual = median(&mut radii.clone());
-        Some(radii.into_iter().map(|r| r / usual - 1.0).collect())
-    };
-    let left: Vec<f64> = fitted.iter().map(of_run).collect::<Option<Vec<_>>>()?.concat();
-    Some(robust_deviation(left.into_iter())).filter(|left| left.is_finite())
 }
 
 /// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
@@ -416,7 +386,11 @@ fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained
                 std::f64::consts::SQRT_2 * value(e, "amplitude").abs(),
                 "corrected as a constant that changes sign with the direction; runs at two speeds tell a lag from play",
             ),
-            _ => add("rate-dependent", None, 0.0, "corrected as an error in proportion to the acceleration"),
+            "acceleration-lag" => {
+                add("rate-dependent", None, 0.0, "corrected as an error in proportion to the acceleration");
+            }
+            // a bias or a lag that may as well be nothing has a name
+            _ => {}
         }
     }
     out

@@ -1,0 +1,36 @@
+//! What a calibration says of the rows that it was made of: where they stood, and how round they were.
+
+use cvg_model::Envelope;
+use cvg_model::effects::Moment;
+
+use super::gap::Gap;
+use super::samples::{Reading, SensorRun};
+use crate::model::hypothesis::Hypothesis;
+use crate::numerics::statistics::{median, robust_deviation};
+
+/// Where in the sensor's period rows stood that a table was made of, from and to, deg of its own angle; `None` where that is all of it.
+pub(super) fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<[f64; 2]> {
+    hypothesis.angle_table.as_ref()?;
+    let read = |x, y| hypothesis.bearing(&hypothesis.unread(Envelope::new(x, 0.0, y, 0.0), &Moment::default()));
+    let angles = fitted.iter().flat_map(|run| match &run.reading {
+        Reading::Angle(theta) => theta.clone(),
+        Reading::Channels(channels) => channels.iter().map(|[x, y]| read(*x, *y)).collect(),
+    });
+    let covered = Gap::of(angles, std::f64::consts::TAU / hypothesis.period_rad)?.covered();
+    Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
+}
+
+/// What is left of the radius of the fitted rows, of each run about its median, as a robust deviation and a share.
+pub(super) fn radius_left(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<f64> {
+    let of_run = |run: &SensorRun| -> Option<Vec<f64>> {
+        let radii = run.channels()?.iter().map(|[x, y]| {
+            let z = hypothesis.unread(Envelope::new(*x, 0.0, *y, 0.0), &Moment::default());
+            z.x_c.hypot(z.y_c)
+        });
+        let radii: Vec<f64> = radii.collect();
+        let usual = median(&mut radii.clone());
+        Some(radii.into_iter().map(|r| r / usual - 1.0).collect())
+    };
+    let left: Vec<f64> = fitted.iter().map(of_run).collect::<Option<Vec<_>>>()?.concat();
+    Some(robust_deviation(left.into_iter())).filter(|left| left.is_finite())
+}
