@@ -21,18 +21,26 @@ const BESIDE: usize = 2;
 const SPAN: f64 = 10.0;
 /// What leads to a leap from before and from after is the same within this share of it: it is no step.
 const BACK: f64 = 0.2;
+/// A command that leaps in more than this share of the rows is given in pulses.
+const MOST_OF_A_COMMAND: f64 = 0.01;
 /// So many rows in a row leap at the most, and of a cluster this share and one.
 const LONGEST: usize = 2;
 const OF_A_CLUSTER: usize = 3;
 
-/// Puts into rows in which a channel of the vibration leaps what lies between those beside them; how many they are, and what to say of
+/// Puts into rows in which a channel of the vibration, or a command, leaps what lies between those beside them; how many they are, and what to say of
 /// them. The row stays: its rate belongs to the angle of the reference.
 pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
-    let channels = [Channel::Xc, Channel::Yc, Channel::Xs, Channel::Ys];
     let mut leaping = vec![false; recording.len()];
-    for channel in channels {
+    for channel in [Channel::Xc, Channel::Yc, Channel::Xs, Channel::Ys, Channel::Vas, Channel::Vqc] {
         let Some(mut values) = recording.channel(channel).map(<[f64]>::to_vec) else { continue };
-        let leaps = Column { t_s: &recording.t_s, values: &values }.leaps();
+        let mut leaps = Column { t_s: &recording.t_s, values: &values }.leaps();
+        if matches!(channel, Channel::Vas | Channel::Vqc) {
+            // a loop that begins to work leaps at the beginning
+            leaps.retain(|(i, _)| (BESIDE..values.len() - BESIDE).contains(i));
+            if leaps.len() as f64 > MOST_OF_A_COMMAND * values.len() as f64 {
+                continue;
+            }
+        }
         for (i, value) in leaps {
             values[i] = value;
             leaping[i] = true;
@@ -43,8 +51,8 @@ pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
     let count: usize = rows.iter().map(Range::len).sum();
     let said = || {
         format!(
-            "{}: a channel leaps for single rows, which no vibration does: {}; {count} rows are spikes, and take what lies between those \
-             beside them",
+            "{}: a channel or a command leaps for single rows, which no vibration does: {}; {count} rows are spikes, and take what lies between \
+             those beside them",
             recording.source.display(),
             places(&recording.t_s, &rows)
         )

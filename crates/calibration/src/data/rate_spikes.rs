@@ -10,7 +10,7 @@ use crate::recording::Recording;
 const LEAP: f64 = 20.0;
 const USUAL: f64 = 0.99;
 /// … and more than this share of the rate before and after.
-const LEAST: f64 = 0.5;
+const LEAST: f64 = 0.02;
 /// Before and after it the rates are the same within this share of the leap.
 const BACK: f64 = 0.2;
 

@@ -2,6 +2,7 @@
 
 use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Stage};
 
+use crate::data::leaping_rows;
 use crate::data::plausibility::{without_commands_in_another_unit, without_dead_command, without_held_commands};
 use crate::data::track::Track;
 use crate::error::Refusal;
@@ -96,6 +97,7 @@ impl Dataset {
         // a ring-down tells nothing without its command
         let (mut ring_down_runs, mut ring_downs_left_out) = (Vec::new(), Vec::new());
         for mut run in ring_downs {
+            warnings.extend(leaping_rows::mend(&mut run.recording).map(|(_, said)| said));
             let off_s =
                 if let RunKind::Ringdown { energy_off_s, .. } = run.kind { energy_off_s } else { f64::INFINITY };
             if without_dead_command(&mut run.recording, off_s, &mut warnings) {

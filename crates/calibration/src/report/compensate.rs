@@ -55,7 +55,8 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
     needs_no_reference(h, rated.as_ref().unwrap_or(recording))?;
     needs_no_temperature(h, recording)?;
     let mut read = rated.unwrap_or_else(|| recording.clone());
-    let leaps = leaping_rows::mend(&mut read);
+    // what a sensor reads in a row stays in that row
+    let leaps = if h.instrument == Instrument::Gyroscope { leaping_rows::mend(&mut read) } else { None };
     let run = Run {
         kind: RunKind::Rotation,
         file: recording.source.clone(),
