@@ -6,7 +6,8 @@ use cvg_model::effects::Moment;
 use super::gap::Gap;
 use super::samples::{Reading, SensorRun};
 use crate::model::hypothesis::Hypothesis;
-use crate::numerics::statistics::{median, robust_deviation};
+use crate::numerics::statistics::median;
+use crate::report::belonging::with_the_angle;
 
 /// Where in the sensor's period rows stood that a table was made of, from and to, deg of its own angle; `None` where that is all of it.
 pub(super) fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<[f64; 2]> {
@@ -20,17 +21,17 @@ pub(super) fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Opti
     Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
 }
 
-/// What is left of the radius of the fitted rows, of each run about its median, as a robust deviation and a share.
+/// How much of the radius of the fitted rows goes with their angle with the readout undone, as a share of it.
 pub(super) fn radius_left(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Option<f64> {
-    let of_run = |run: &SensorRun| -> Option<Vec<f64>> {
-        let radii = run.channels()?.iter().map(|[x, y]| {
+    let of_run = |run: &SensorRun| -> Option<Vec<[f64; 2]>> {
+        let undone = run.channels()?.iter().map(|[x, y]| {
             let z = hypothesis.unread(Envelope::new(*x, 0.0, *y, 0.0), &Moment::default());
-            z.x_c.hypot(z.y_c)
+            [hypothesis.bearing(&z), z.x_c.hypot(z.y_c)]
         });
-        let radii: Vec<f64> = radii.collect();
-        let usual = median(&mut radii.clone());
-        Some(radii.into_iter().map(|r| r / usual - 1.0).collect())
+        let undone: Vec<[f64; 2]> = undone.collect();
+        let usual = median(&mut undone.iter().map(|[_, radius]| *radius).collect::<Vec<_>>());
+        Some(undone.into_iter().map(|[angle, radius]| [angle, radius / usual]).collect())
     };
-    let left: Vec<f64> = fitted.iter().map(of_run).collect::<Option<Vec<_>>>()?.concat();
-    Some(robust_deviation(left.into_iter())).filter(|left| left.is_finite())
+    let left = with_the_angle(&fitted.iter().map(of_run).collect::<Option<Vec<_>>>()?.concat());
+    Some(left).filter(|left| left.is_finite())
 }

@@ -15,16 +15,18 @@ use crate::numerics::statistics::{circular_mean, line, median, root_mean_square,
 
 /// A sensor that is bolted to its reference has a whole number of periods a turn: an estimate this close to one is one, and one
 /// up to so far from it where errors of the position could have made the difference: where the slope beside them is told as well as is close,
-/// and is this close; or where it is not, and the line leaves this share at least of what it would be off by.
+/// and is this close; or where it is not, and that beside errors once and twice a turn could be whole, or the line leaves so many times as
+/// much as the whole number would be off by: an eccentricity makes a third of that on three quarters of a turn, at worst.
 const WHOLE: f64 = 0.02;
 const WHOLE_BESIDE_ERRORS: f64 = 0.05;
 const FARTHEST_FROM_WHOLE: f64 = 0.3;
 const WHOLE_SLOPE: f64 = 0.01;
 const FARTHEST_WHERE_NOT_TOLD: f64 = 0.1;
-const LEAST_LEFT_BY_A_LINE: f64 = 0.3;
+const LEAST_LEFT_BY_A_LINE: f64 = 1.5;
 /// Standard errors within which a slope is what it could be (95 %).
 const BY_CHANCE: f64 = 2.0;
-/// Harmonics of the position beside a slope, at most, and rows for each.
+/// Harmonics of the position beside a slope, and rows for each where there are more.
+const FEWEST_HARMONICS: usize = 2;
 const MOST_HARMONICS: usize = 12;
 const ROWS_PER_HARMONIC: usize = 8;
 /// Rows beyond which every so many tell a slope.
@@ -277,15 +279,16 @@ fn is_whole_beside_errors(size: f64, runs: &[SensorRun], period: f64) -> bool {
     let Some((reference, followed)) = longest(runs, period).filter(|_| size > 0.5 && off < FARTHEST_FROM_WHOLE) else {
         return false;
     };
-    let Some((slope, deviation)) = slope_beside_errors(reference, &followed) else { return false };
-    let by_chance = BY_CHANCE * deviation;
-    let apart = (slope - whole).abs();
-    if by_chance < WHOLE {
-        return apart < WHOLE_SLOPE.max(by_chance);
+    let beside = |harmonics: usize| slope_beside_errors(reference, &followed, harmonics);
+    let Some((slope, deviation)) = beside(MOST_HARMONICS) else { return false };
+    if BY_CHANCE * deviation < WHOLE {
+        return (slope - whole).abs() < WHOLE_SLOPE.max(BY_CHANCE * deviation);
     }
+    let is_by_chance = |(slope, deviation): (f64, f64)| (slope - whole).abs() <= BY_CHANCE * deviation;
+    let could_be = || beside(FEWEST_HARMONICS).is_some_and(is_by_chance);
     let tilt = off * span(reference) / 12f64.sqrt();
-    let could_be = apart <= by_chance && off < WHOLE_BESIDE_ERRORS;
-    could_be || (off < FARTHEST_WHERE_NOT_TOLD && left_by_a_line(reference, &followed) > LEAST_LEFT_BY_A_LINE * tilt)
+    (off < WHOLE_BESIDE_ERRORS && could_be())
+        || (off < FARTHEST_WHERE_NOT_TOLD && left_by_a_line(reference, &followed) > LEAST_LEFT_BY_A_LINE * tilt)
 }
 
 /// What a line leaves of the followed angle, rad rms.
@@ -294,11 +297,11 @@ fn left_by_a_line(reference: &[f64], followed: &[f64]) -> f64 {
     root_mean_square(&reference.iter().zip(followed).map(|(a, f)| f - start - slope * a).collect::<Vec<_>>())
 }
 
-/// The slope of the followed angle beside harmonics of the position, and its deviation.
-fn slope_beside_errors(reference: &[f64], followed: &[f64]) -> Option<(f64, f64)> {
+/// The slope of the followed angle beside so many harmonics of the position, or as many as the rows carry, and its deviation.
+fn slope_beside_errors(reference: &[f64], followed: &[f64], most: usize) -> Option<(f64, f64)> {
     let begin = reference.first().copied()?;
     let stride = reference.len().div_ceil(ENOUGH_ROWS);
-    let harmonics = (reference.len() / stride / ROWS_PER_HARMONIC).clamp(2, MOST_HARMONICS);
+    let harmonics = (reference.len() / stride / ROWS_PER_HARMONIC).min(most).max(FEWEST_HARMONICS);
     let unknowns = 2 + 2 * harmonics;
     let row = |a: f64| {
         let of = |n: usize| <[f64; 2]>::from((n as f64 * a).sin_cos());

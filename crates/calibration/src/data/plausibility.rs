@@ -60,10 +60,6 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
     let name = recording.source.display().to_string();
     findings.warnings.extend(held_reference::go_on_evenly(recording));
     rate_spikes::leave_out(recording, &name, &mut findings.warnings);
-    if let Some((rows, said)) = leaping_rows::mend(recording) {
-        findings.spikes = rows;
-        findings.warnings.push(said);
-    }
     match references(recording, &name, &mut findings.warnings) {
         Ok(apart) => findings.references_apart = apart,
         Err(broken) => {
@@ -91,6 +87,11 @@ pub(crate) fn mend(recording: &mut Recording) -> Findings {
         return findings;
     }
     interpolated::leave_out(recording, &name, &mut findings);
+    // after what puts whole rows in the place of others, and before values that stand still up to a leap
+    if let Some((rows, said)) = leaping_rows::mend(recording) {
+        findings.spikes = rows;
+        findings.warnings.push(said);
+    }
     let rows = recording.len();
     let held = held_rows(recording);
     let lost: usize = held.iter().map(Range::len).sum();

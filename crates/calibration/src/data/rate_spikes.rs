@@ -7,8 +7,8 @@ use crate::data::plausibility::{leave_out as leave_out_rows, places, stretches};
 use crate::recording::Recording;
 
 /// A leap is this many times the steps that the rate usually makes, of which [`USUAL`] are smaller.
-const LEAP: f64 = 20.0;
-const USUAL: f64 = 0.99;
+const LEAP: f64 = 30.0;
+const USUAL: f64 = 0.9;
 /// … and more than this share of the rate before and after.
 const LEAST: f64 = 0.02;
 /// Before and after it the rates are the same within this share of the leap.

@@ -271,12 +271,16 @@ impl Screen {
             }
             self.counts_as_stated(&moving)?;
         }
+        let only = |m: &Motion| format!("the pattern turns through {:.1}° only", m.travel.to_degrees());
+        let is_short = |(track, m): &(Track, Motion)| track.samples(Role::Fit) == 0 && m.travel < std::f64::consts::PI;
+        let short = moving.iter().enumerate().filter(|(_, run)| is_short(run)).map(|(at, (_, m))| (at, only(m)));
+        let short: Vec<(usize, String)> = short.collect();
+        let moving = self.without(moving, &short, warnings);
         let far_enough = |(track, motion): (Track, Motion)| {
             if motion.travel >= std::f64::consts::PI {
                 return Ok((track, motion));
             }
-            let problem = format!("the pattern turns through {:.1}° only", motion.travel.to_degrees());
-            Err(Refusal::new(&track.name, problem, "at least half a turn (180°)"))
+            Err(Refusal::new(&track.name, only(&motion), "at least half a turn (180°)"))
         };
         let mut ready = self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)?;
         if ready.iter().all(|(track, _)| track.samples(Role::Holdout) == 0) {

@@ -40,7 +40,7 @@ const LARGEST_LEFT_IN_THE_RADIUS: f64 = 0.02;
 const MIRRORED: f64 = 0.5;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
-/// … where the radius is not within this factor of what the calibration left of it where it was made.
+/// … where what of the radius goes with the angle is not within this factor of what the calibration left where it was made.
 const AS_CALIBRATED: f64 = 2.0;
 
 /// Refuses a recording of another instrument.
@@ -91,8 +91,8 @@ pub(crate) fn require_of_the_calibrated(
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     if h.instrument == Instrument::Sensor && channels && goes_round {
         let [before, after] = [0, 1].map(|i| 100.0 * radius_error(rows, i));
-        let as_calibrated = 100.0 * AS_CALIBRATED * calibration.provenance.radius_left.unwrap_or(0.0);
-        if after > WORSE * before && after > as_calibrated {
+        let is_as_calibrated = || with_the_angle(&angles_and_radii(rows)) < as_calibrated(calibration);
+        if after > WORSE * before && !is_as_calibrated() {
             let problem =
                 format!("with the calibration undone its radius is off by {after:.2} %, as recorded by {before:.2} %");
             return refuse(problem, None);
@@ -142,22 +142,34 @@ pub(crate) fn left_in_the_radius(calibration: &Calibration, rows: &[Row]) -> Opt
     if h.instrument != Instrument::Sensor || !corrected || !goes_round(rows, h.period_rad) {
         return None;
     }
-    let usual = median(&mut rows.iter().map(|r| r.radius[1]).collect::<Vec<_>>());
-    let mut equations = NormalEquations::new(5);
-    for r in rows {
-        let ((s1, c1), (s2, c2)) = (r.angle_rad[1].sin_cos(), (2.0 * r.angle_rad[1]).sin_cos());
-        equations.add(&[1.0, c1, s1, c2, s2], r.radius[1] / usual);
-    }
-    let share = equations.solve()[1..].iter().fold(0.0, |sum: f64, a| sum.hypot(*a));
-    // a wave of this robust deviation has an amplitude √2 times as large
-    let as_calibrated = AS_CALIBRATED * std::f64::consts::SQRT_2 * calibration.provenance.radius_left.unwrap_or(0.0);
-    (share > LARGEST_LEFT_IN_THE_RADIUS.max(as_calibrated)).then(|| {
+    let share = with_the_angle(&angles_and_radii(rows));
+    (share > LARGEST_LEFT_IN_THE_RADIUS.max(as_calibrated(calibration))).then(|| {
         format!(
             "with the calibration undone its radius still goes with its angle by {:.1} %: a recording of another sensor than \
              the calibrated one, or that one has changed",
             100.0 * share
         )
     })
+}
+
+/// How much of a radius goes with the angle, once and twice a turn, as a share of it.
+pub(crate) fn with_the_angle(angles_and_radii: &[[f64; 2]]) -> f64 {
+    let usual = median(&mut angles_and_radii.iter().map(|[_, radius]| *radius).collect::<Vec<_>>());
+    let mut equations = NormalEquations::new(5);
+    for [angle, radius] in angles_and_radii {
+        let ((s1, c1), (s2, c2)) = (angle.sin_cos(), (2.0 * angle).sin_cos());
+        equations.add(&[1.0, c1, s1, c2, s2], radius / usual);
+    }
+    equations.solve()[1..].iter().fold(0.0, |sum: f64, a| sum.hypot(*a))
+}
+
+fn angles_and_radii(rows: &[Row]) -> Vec<[f64; 2]> {
+    rows.iter().map(|r| [r.angle_rad[1], r.radius[1]]).collect()
+}
+
+/// How much of the radius may go with the angle, where the calibration left some where it was made.
+fn as_calibrated(calibration: &Calibration) -> f64 {
+    AS_CALIBRATED * calibration.provenance.radius_left.unwrap_or(0.0)
 }
 
 /// Whether the reference turns, and the angle goes round once and more, or would.

@@ -57,7 +57,8 @@ pub struct Provenance {
     /// where in the sensor's period the rows stood that a table was made of, from and to, deg of its own angle; none where that is all of
     /// it, or there is no table
     pub covered_deg: Option<[f64; 2]>,
-    /// robust deviation of the radius of the rows that a sensor's readout was made of, with it undone, as a share; none where there is none
+    /// how much of the radius goes with the angle in the rows that a sensor's readout was made of, with it undone, as a share; none where
+    /// there are no channels
     pub radius_left: Option<f64>,
 }
 

@@ -141,25 +141,17 @@ impl Inference<'_> {
 
     /// The angular gain. A precession p sin 4θ slows the mean of −kΩ to √((kΩ)² − p²), an error of the readout does not:
     /// where a residual at 4θ is corrected as either without a known cause, what the other would make of k is allowed for. So
-    /// is what single runs contradict it with, by how much the references of every run differ, what is beyond belief, and what a ripple w
-    /// beside a table's own angle would make of it, ½ w², were the angle a commanded one and not what was read.
+    /// is what single runs contradict it with, by how much the references of every run differ, and what is beyond belief.
     pub(crate) fn angular_gain(&self, warnings: &mut Vec<String>) -> Estimate {
         let estimate = self.estimate(Unknown::AngularGain);
         let slowest = self.dataset.tracks.iter().map(|t| t.track.mean_speed()).fold(f64::INFINITY, f64::min);
         let nominal = (estimate.value * slowest).abs().max(f64::MIN_POSITIVE);
         let causeless = self.hypothesis().members.iter().filter(|m| m.origin == Origin::Empirical);
         let slowed: f64 = causeless.map(|m| slowing(m, nominal)).sum();
-        let open = slowed + self.rippled() + self.dataset.screen.references_apart;
+        let open = slowed + self.dataset.screen.references_apart;
         let estimate = estimate.widened(open * estimate.value.abs() + self.beyond_belief(Unknown::AngularGain));
         let estimate = covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings);
         self.turned_back_once(estimate, warnings)
-    }
-
-    /// By which share a ripple of the table's rate would slow its mean, where its own angle was taken for the reference.
-    fn rippled(&self) -> f64 {
-        let ripples = self.hypothesis().members.iter().filter(|m| m.id == EffectId::TableHarmonic);
-        let has_table = self.dataset.tracks.iter().any(|t| t.track.has_table);
-        ripples.filter(|_| has_table).map(|m| 0.5 * (m.values[1].powi(2) + m.values[2].powi(2))).sum()
     }
 
     /// The parameters that the fit moved beyond belief, each with the centre and the deviation of that.
