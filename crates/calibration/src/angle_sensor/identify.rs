@@ -73,6 +73,8 @@ const TURNS_FOR_WAVES: f64 = 1.5;
 const ENOUGH_ROWS: usize = 3000;
 /// How far an angle may turn, of what its gain asks for, and be of its reference.
 const FOLLOWING: std::ops::Range<f64> = 0.5..2.0;
+/// A free gain changes by this share at most: what the readout and errors of the position take of a line.
+const LARGEST_CHANGE_OF_GAIN: f64 = 0.5;
 /// Half a turn, rad, as it is measured: rows stand a little short of both its ends.
 const HALF_A_TURN: f64 = 0.99 * std::f64::consts::PI;
 
@@ -240,6 +242,19 @@ fn require_following(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result
     ))
 }
 
+/// A gain that ends far from what a line says of the angle was taken away with the error.
+fn require_a_gain(model: &SensorModel) -> Result<(), Refusal> {
+    let (gain, moved) = (model.sensor.gain.abs(), model.table.moved_gain().abs());
+    if model.outcome == Outcome::Neutral || moved < LARGEST_CHANGE_OF_GAIN * gain {
+        return Ok(());
+    }
+    Err(Refusal::no_answer(
+        "campaign",
+        format!("a line through the angle says {gain:.4} periods a turn, and the fit is {moved:.4} off that"),
+        "angular_gain or pole_pairs in campaign.toml, or a reference that turns further",
+    ))
+}
+
 /// The raw angle turns, because the origin lies within what the channels draw.
 fn raw_turns(model: &SensorModel) -> bool {
     model.front().is_none_or(|r| r.kind == Kind::Plain || r.is_about_the_origin())
@@ -344,6 +359,7 @@ fn sensor_finding(
     let declared = model.front().map(|r| r.declared(raw_turns));
     let neutral = model.outcome == Outcome::Neutral;
     let mut warnings = said_of(&model, stated, period, runs, held, rates_alone)?;
+    require_a_gain(&model)?;
     let own = own_gain_ratios(&model, &thinned).into_iter();
     let all = described.gain_ratio();
     let all = all.map(|all| covering(all, "detection gain ratio", own, CONTRADICTS, &mut warnings));

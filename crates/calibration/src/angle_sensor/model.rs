@@ -16,8 +16,6 @@ use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
 use crate::model::hypothesis::Origin;
 
-/// A free gain changes by this share at most: what the readout and errors of the position take of a line.
-const LARGEST_CHANGE_OF_GAIN: f64 = 0.5;
 /// Rows of the last fit; more would not narrow what still means something.
 const ENOUGH_ROWS: usize = 100_000;
 /// What an ellipse may leave of the radius, rms, where nothing else tells the readout: engineering choice.
@@ -156,10 +154,6 @@ impl SensorModel {
             stands = of_angle + autoregression::gain(&ln_radius(&raw), &ln_radius(&found), 0) > 0.0;
             table = TableFit::new(&Shape::constant(sensor.free_gain), &samples, runs.len(), sensor.cycles)?;
             (readout, predicted) = (Some((found, weighting)), losses.rms());
-        }
-        if table.moved_gain().abs() > LARGEST_CHANGE_OF_GAIN * sensor.gain.abs() {
-            // the angle was taken away with its error
-            return None;
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();

@@ -29,6 +29,8 @@ const MOST_OF_A_COMMAND: f64 = 0.03;
 /// Nothing is read where the amplitude is below this share of the usual one; so many such rows in a row can be filled in.
 const NOTHING: f64 = 0.1;
 const LONGEST_LOST: usize = 5;
+/// … beside rows in which so many times as much is.
+const AGAIN: f64 = 3.0;
 /// So many rows in a row leap at the most, and of a cluster this share and one.
 const LONGEST: usize = 2;
 const OF_A_CLUSTER: usize = 3;
@@ -77,7 +79,11 @@ fn lost(recording: &Recording) -> Vec<bool> {
     let usual = median(&mut sizes.clone());
     let mut lost = vec![false; rows];
     let all = stretches(rows, |i| sizes[i] < NOTHING * usual);
-    all.into_iter().filter(|r| r.len() <= LONGEST_LOST).for_each(|r| lost[r].fill(true));
+    // an amplitude that decays goes there by degrees
+    let is_read = |i: usize| i >= rows || sizes[i] > AGAIN * NOTHING * usual;
+    let is_a_gap =
+        |r: &Range<usize>| r.len() <= LONGEST_LOST && is_read(r.end) && (r.start == 0 || is_read(r.start - 1));
+    all.into_iter().filter(is_a_gap).for_each(|r| lost[r].fill(true));
     lost
 }
 

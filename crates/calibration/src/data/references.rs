@@ -12,6 +12,8 @@ const AGREE: f64 = 0.02;
 const ONE_RATE: f64 = 1e-3;
 /// So many steps of both tell whether they do.
 const FEWEST_STEPS: usize = 16;
+/// Beyond half a turn a step, steps that scatter by more than this, degrees, or differ by it, have nothing of each other: at random it is 90.
+const AT_RANDOM_DEG: f64 = 45.0;
 /// A factor between them is a unit's within this share.
 const A_UNIT: f64 = 0.02;
 const TURN_DEG: f64 = 360.0;
@@ -95,15 +97,16 @@ fn beyond_half_a_turn(steps: &[[f64; 2]], name: &str, warnings: &mut Vec<String>
         let mut off: Vec<f64> = steps.iter().map(|[r, t]| wrapped(t - sign * r, TURN_DEG)).collect();
         let middle = median(&mut off);
         let mut scatter: Vec<f64> = off.iter().map(|d| (d - middle).abs()).collect();
-        let unsure = 3.0 * median(&mut scatter) / (steps.len() as f64).sqrt();
-        (middle, unsure)
+        let scatter = median(&mut scatter);
+        let within = (AGREE * usual + 3.0 * scatter / (steps.len() as f64).sqrt()).min(AT_RANDOM_DEG);
+        (middle, 3.0 * scatter / (steps.len() as f64).sqrt(), middle.abs() <= within && scatter < AT_RANDOM_DEG)
     };
-    let (ahead, unsure) = off(1.0);
-    if ahead.abs() <= AGREE * usual + unsure {
+    let (ahead, unsure, agree) = off(1.0);
+    if agree {
         return Ok(apart(forward * ahead / usual, unsure / usual, name, warnings));
     }
-    let (behind, unsure) = off(-1.0);
-    if behind.abs() <= AGREE * usual + unsure {
+    let (_, _, agree) = off(-1.0);
+    if agree {
         warnings.push(the_other_way(name));
         return Ok(0.0);
     }
@@ -138,6 +141,27 @@ mod tests {
         assert!(of(1.01).is_ok_and(|apart| (apart - 0.01).abs() < 1e-9));
         for factor in [0.7, 1.04, 1.229, 1.5] {
             assert!(of(factor).is_err_and(|b| b.problem.contains("from row to row")), "{factor}");
+        }
+    }
+
+    #[test]
+    fn steps_of_many_turns_that_have_nothing_of_each_other_do_not_agree() {
+        // a table that swings, with times in ms for s
+        let t_s: Vec<f64> = (0..800).map(|i| 10.0 * f64::from(i)).collect();
+        for size in [180.0, 274.0, 390.0] {
+            let rate: Vec<f64> = (0..800).map(|i| size * (0.004 * f64::from(i)).cos() + 1.0).collect();
+            let mut angle = 0.0;
+            let table = rate.iter().map(|r| {
+                angle += 0.01 * r;
+                f64::rem_euclid(angle, 360.0)
+            });
+            let recording = Recording {
+                table_deg: Some(table.collect()),
+                rate_dps: Some(rate.clone()),
+                t_s: t_s.clone(),
+                ..recorded()
+            };
+            assert!(references(&recording, "ms.csv", &mut Vec::new()).is_err(), "{size}");
         }
     }
 
