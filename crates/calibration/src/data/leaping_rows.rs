@@ -115,7 +115,9 @@ impl Column<'_> {
         let is_lost = (0..n).filter(|i| self.lost[*i]);
         let mut found: Vec<(usize, f64)> = is_lost.map(|i| (i, self.between(i, &[]))).collect();
         for cluster in clusters(&own, limit) {
-            let Some(leaping) = leaping(cluster.filter(|i| !self.lost[*i]).collect(), limit, off) else { continue };
+            let Some(leaping) = leaping(&cluster.filter(|i| !self.lost[*i]).collect::<Vec<_>>(), limit, off) else {
+                continue;
+            };
             let goes_back = |i: &usize| self.goes_back(*i, &leaping);
             if leaping.iter().all(goes_back) {
                 found.extend(leaping.iter().map(|i| (*i, self.between(*i, &leaping))));
@@ -191,7 +193,7 @@ fn clusters(off: &[f64], limit: f64) -> Vec<Range<usize>> {
 }
 
 /// The rows of a cluster without which the rest is smooth; none where that takes too many.
-fn leaping(cluster: Vec<usize>, limit: f64, off: impl Fn(usize, &[usize]) -> f64) -> Option<Vec<usize>> {
+fn leaping(cluster: &[usize], limit: f64, off: impl Fn(usize, &[usize]) -> f64) -> Option<Vec<usize>> {
     let most = 1 + cluster.len() / OF_A_CLUSTER;
     let mut out: Vec<usize> = Vec::new();
     loop {
