@@ -63,11 +63,17 @@ fn a_trimmed_device_without_ring_downs_states_what_its_drives_may_do() {
 /// Ring-downs at 0° and 120°, and at 60° and 135° beside a skew of the drives: the loop that holds the pattern works on it too.
 #[test]
 fn ring_downs_in_any_direction_tell_the_drives_or_say_how_little() {
-    for (directions, ratio, skew, within) in
-        [([0.0, 120.0], 0.8, 0.0, 0.005), ([0.0, 90.0], 0.8, 0.0, 0.001), ([60.0, 135.0], 1.0, -0.033, 0.05)]
-    {
-        let mut settings = device(&[200.0, -90.0], &directions, 3);
+    let cases: [(&[f64], f64, f64, f64, f64); 4] = [
+        (&[0.0, 120.0], 0.8, 1.0, 0.0, 0.005),
+        (&[0.0, 90.0], 0.8, 1.0, 0.0, 0.001),
+        (&[60.0, 135.0], 1.0, 1.0, -0.033, 0.05),
+        // the commands act along the direction that is read
+        (&[90.0, 60.0, 120.0], 0.9257, 1.0636, 0.0, 0.0005),
+    ];
+    for (directions, ratio, detection, skew, within) in cases {
+        let mut settings = device(&[200.0, -90.0], directions, 3);
         settings.effects[0] = effect(EffectId::ActuationGainMismatch, &[ratio]);
+        settings.effects[1] = effect(EffectId::DetectionGainMismatch, &[detection]);
         if skew != 0.0 {
             settings.effects.push(effect(EffectId::ActuationSkew, &[skew]));
             settings.effects.sort_by_key(|e| e.id);

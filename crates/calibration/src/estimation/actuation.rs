@@ -22,6 +22,8 @@ pub struct RingDown {
     pub name: String,
     /// direction of the pattern, rad
     pub angle_rad: f64,
+    /// … as it was read, along which the commands act
+    pub read_rad: f64,
     /// decay time constant of the amplitude, s
     pub tau_s: f64,
     /// its standard error, s
@@ -89,8 +91,9 @@ impl Phase {
 struct Phases {
     on: Phase,
     off: Phase,
-    /// of the pattern from the campaign's angle, rad
+    /// of the pattern from the campaign's angle, rad, and as it was read
     off_angle: Vec<f64>,
+    read: Vec<f64>,
     decay: Vec<(f64, f64)>,
 }
 
@@ -112,7 +115,13 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
     let command = |v: Option<&Vec<f64>>, i: usize| v.map(|v| v[i]).filter(|v| v.is_finite()).unwrap_or_default();
     let steady = energy_off_s - STEADY_SHARE * (energy_off_s - r.t_s[settled.start]);
     let stride = (settled.len() / KEPT_POINTS).max(1);
-    let mut found = Phases { on: Phase::default(), off: Phase::default(), off_angle: Vec::new(), decay: Vec::new() };
+    let mut found = Phases {
+        on: Phase::default(),
+        off: Phase::default(),
+        off_angle: Vec::new(),
+        read: Vec::new(),
+        decay: Vec::new(),
+    };
     let (mut before, mut work) = (None, 0.0);
     for i in settled.clone() {
         let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
@@ -122,6 +131,7 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
         let now = Moment { t_s: r.t_s[i], warmer_k: warmer_k(i), drive, ..Moment::default() };
         let p = hypothesis.unread(seen, &now).pendulum();
         found.off_angle.push(wrapped(p.angle() - angle_rad, std::f64::consts::PI));
+        found.read.push(wrapped(seen.pendulum().angle() - angle_rad, std::f64::consts::PI));
         let ln_a = 0.5 * p.e.ln();
         if !ln_a.is_finite() {
             continue;
@@ -167,7 +177,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     };
     let refuse = |problem: String, wanted: &str| Err(Refusal::new(&name, problem, wanted));
     let angle_rad = angle_deg.to_radians();
-    let Phases { mut on, mut off, off_angle, decay } = phases(run, hypothesis, angle_rad, energy_off_s)?;
+    let Phases { mut on, mut off, off_angle, mut read, decay } = phases(run, hypothesis, angle_rad, energy_off_s)?;
     let middle = crate::numerics::statistics::median(&mut off_angle.clone());
     let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
     if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
@@ -218,6 +228,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     Ok(RingDown {
         name,
         angle_rad: angle_rad + middle,
+        read_rad: angle_rad + crate::numerics::statistics::median(&mut read),
         tau_s: 1.0 / rate,
         tau_error_s: decayed.error.hypot(decayed.uneven_error) / (rate * rate),
         uneven: decayed.uneven,
@@ -371,7 +382,8 @@ pub struct DriveGains {
 impl DriveGains {
     /// From ring-downs; `None` where their directions do not tell the axes apart. The rate loop holds the pattern against what unequal
     /// and skewed drives make of the energy command, and its force has a part along the pattern too: together they act with
-    /// 1/G(θ) = cos²θ/G_Ax + sin²θ/G_Ay − s_a sin θ cos θ/G_Ay, of which the skew s_a is told by three directions, or believed.
+    /// 1/G(θ) = cos θ_r cos θ/G_Ax + sin θ_r sin θ/G_Ay − s_a sin θ_r cos θ/G_Ay, with the direction θ_r that was read, of which the skew
+    /// s_a is told by three directions, or believed.
     pub fn from_ring_downs(ring_downs: &[RingDown]) -> Option<Self> {
         let inverse_gain = |r: &RingDown| -r.tau_s * r.drive;
         let usual = ring_downs.iter().map(inverse_gain).sum::<f64>() / ring_downs.len().max(1) as f64;
@@ -379,8 +391,8 @@ impl DriveGains {
         let (mut normal, mut right) = (Matrix3::from_diagonal(&believed), Vector3::zeros());
         for r in ring_downs {
             let relative = (r.tau_error_s / r.tau_s).hypot(r.drive_error / r.drive).max(1e-9);
-            let (sin, cos) = r.angle_rad.sin_cos();
-            let row = Vector3::new(cos * cos, sin * sin, -sin * cos);
+            let ((sin, cos), (sin_read, cos_read)) = (r.angle_rad.sin_cos(), r.read_rad.sin_cos());
+            let row = Vector3::new(cos_read * cos, sin_read * sin, -sin_read * cos);
             let weight = 1.0 / (relative * inverse_gain(r)).powi(2);
             normal += row * row.transpose() * weight;
             right += row * inverse_gain(r) * weight;

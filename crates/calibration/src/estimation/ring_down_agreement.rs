@@ -233,6 +233,7 @@ mod tests {
             RingDown {
                 name: format!("{deg}"),
                 angle_rad: deg.to_radians(),
+                read_rad: deg.to_radians(),
                 tau_s,
                 tau_error_s: 1e-3 * tau_s,
                 uneven: 0.0,
