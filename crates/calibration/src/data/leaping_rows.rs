@@ -3,7 +3,6 @@
 //!
 //! A value is compared with the cubic through two rows before and two after it. One that leaps pulls those about it off their own
 //! cubics, so that rows are looked at in clusters, and taken out one by one, the furthest first, until the rest is smooth.
-
 //!
 //! Rows in which nothing is read at all were lost on their way and filled in: they say nothing of those about them.
 
@@ -35,8 +34,8 @@ const AGAIN: f64 = 3.0;
 const LONGEST: usize = 2;
 const OF_A_CLUSTER: usize = 3;
 
-/// Puts into rows in which a channel of the vibration, or a command, leaps what lies between those beside them; how many they are, and what to say of
-/// them. The row stays: its rate belongs to the angle of the reference.
+/// Puts into rows in which a channel of the vibration, or a command, leaps, or in which nothing is read, what lies between those beside
+/// them; how many they are, and what to say of them. The row stays: its rate belongs to the angle of the reference.
 pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
     let lost = lost(recording);
     let mut leaping = vec![false; recording.len()];
