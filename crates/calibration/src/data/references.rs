@@ -98,8 +98,9 @@ fn beyond_half_a_turn(steps: &[[f64; 2]], name: &str, warnings: &mut Vec<String>
         let middle = median(&mut off);
         let mut scatter: Vec<f64> = off.iter().map(|d| (d - middle).abs()).collect();
         let scatter = median(&mut scatter);
-        let within = (AGREE * usual + 3.0 * scatter / (steps.len() as f64).sqrt()).min(AT_RANDOM_DEG);
-        (middle, 3.0 * scatter / (steps.len() as f64).sqrt(), middle.abs() <= within && scatter < AT_RANDOM_DEG)
+        let unsure = 3.0 * scatter / (steps.len() as f64).sqrt();
+        let agree = middle.abs() <= (AGREE * usual + unsure).min(AT_RANDOM_DEG) && scatter < AT_RANDOM_DEG;
+        (middle, unsure, agree)
     };
     let (ahead, unsure, agree) = off(1.0);
     if agree {
