@@ -1,4 +1,5 @@
-//! The held-out runs are read when all is decided: another held-out run changes the error that is reported, and nothing else.
+//! The held-out runs are read when all is decided: another held-out run changes the error that is reported, and nothing else, but
+//! for what it plainly refutes.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::{Campaign, Channel, Role};
@@ -40,6 +41,26 @@ fn what_is_held_out_changes_the_reported_error_and_no_answer() {
     let [before, after] = [&as_it_was, &with_another].map(|r| r.heldout.discovered.rms_deg);
     assert!(after > 3.0 * before, "{before} and {after}");
     assert!(with_another.runs.iter().all(|r| r.r#use != "left out"), "{:?}", with_another.runs);
+}
+
+/// What the fitted runs have and the held-out ones have not is taken back, in what is stated and in the calibration.
+#[test]
+fn what_the_held_out_runs_refute_is_taken_back() {
+    let of = |role: Role| {
+        report(|campaign| {
+            for run in campaign.runs.iter_mut().filter(|r| r.role == role) {
+                run.recording.xc_v.iter_mut().flatten().for_each(|x| *x += 3.0 * OFFSET_V);
+            }
+        })
+    };
+    let refuted = of(Role::Fit);
+    let left = refuted.heldout;
+    assert!(left.discovered.rms_deg < 1.01 * left.declared.rms_deg, "{left:?}");
+    let said = refuted.warnings.iter().find(|w| w.contains("taken back")).unwrap();
+    assert!(said.contains("detection-offset"), "{said}");
+    assert!(refuted.effects.iter().all(|e| e.id != "detection-offset"), "{:?}", refuted.effects);
+    // while an error of the held-out runs alone refutes nothing: it is there without the effects as well
+    assert!(of(Role::Holdout).warnings.iter().all(|w| !w.contains("taken back")));
 }
 
 /// A run that was to be held out and that turns the pattern by a third of a turn is left out, and the answer was "only 0 samples are left".

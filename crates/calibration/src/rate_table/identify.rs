@@ -15,6 +15,7 @@ use crate::report::recorded::run_report;
 use crate::selection::discovery::discover;
 use crate::selection::last_step::last_step;
 use crate::selection::not_found::with_what_was_not_found;
+use crate::selection::refuted::take_back_the_refuted;
 use cvg_model::effects::EffectId;
 
 /// Identifies the instrument.
@@ -60,7 +61,11 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         (declared_fit, fitted, steps) = explained(&mut dataset, &clipped)?;
     }
     (options.progress)("weighing by what the noise remembers");
-    let covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    let mut covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    if take_back_the_refuted(&mut dataset, &mut fitted, &mut steps)? {
+        (options.progress)("beginning anew without what the held-out run refutes");
+        covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);
     (options.progress)("measuring the held-out error");

@@ -17,8 +17,8 @@ use crate::recording::Role;
 /// A fit as it stood, for samples that are read later.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
-    hypothesis: Hypothesis,
-    starts: Vec<Vec<Start>>,
+    pub(super) hypothesis: Hypothesis,
+    pub(super) starts: Vec<Vec<Start>>,
 }
 
 impl State {
