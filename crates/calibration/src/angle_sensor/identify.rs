@@ -4,6 +4,7 @@
 use super::circle;
 use super::cross_axis;
 use super::deviations::{Deviations, deviations, own_gain_ratios};
+use super::drift::Drifts;
 use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel, positions};
@@ -139,6 +140,9 @@ pub(crate) fn identify(
                 thermal = Some(told);
             }
         }
+        let drifts = Drifts::told(&fitted, stated, period);
+        [&mut fitted, &mut held].into_iter().flatten().for_each(|run| *run = drifts.undone(run));
+        left_out.extend(drifts.said());
     }
     let (left, needed) = (held.iter().map(SensorRun::len).sum::<usize>(), least_held_out(instrument));
     if left < needed {

@@ -8,6 +8,7 @@ mod cross_axis;
 mod cross_validation;
 pub(crate) mod curve;
 mod deviations;
+mod drift;
 mod effects;
 mod ellipse;
 mod gap;

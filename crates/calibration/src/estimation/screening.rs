@@ -283,13 +283,17 @@ impl Screen {
             Err(Refusal::new(&track.name, only(&motion), "at least half a turn (180°)"))
         };
         let mut ready = self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)?;
-        if ready.iter().all(|(track, _)| track.samples(Role::Holdout) == 0) {
-            warnings.push(
-                "no run that was to be held out is left: the last quarter of each of the others is held out".into(),
-            );
+        let holds_out = |(track, _): &(Track, Motion)| track.samples(Role::Holdout) > 0;
+        if !ready.iter().any(holds_out) {
             for (track, moves) in &mut ready {
                 track.hold_out_the_end();
                 *moves = motion(track, start, guess)?;
+            }
+            // of a few rows the last quarter was held out before, and is none
+            if ready.iter().any(holds_out) {
+                warnings.push(
+                    "no run that was to be held out is left: the last quarter of each of the others is held out".into(),
+                );
             }
         }
         Ok(ready)
