@@ -36,21 +36,22 @@ pub(super) fn shows(readout: &Readout, runs: &[SensorRun]) -> bool {
         let varies = root_mean_square(&recorded);
         let left = root_mean_square(&ln_radius(run, readout));
         // in the channels' unit: where offsets exceed the amplitude, what varies is a small share of a large radius
-        let [recorded_size, size] = [size(run), readout.amplitude * readout.radius];
-        (left <= LEAST || left * size <= LESS_ROUND * varies * recorded_size)
+        let [as_recorded, undone] = [&plain, readout].map(|readout| size(run, readout));
+        (left <= LEAST || left * undone <= LESS_ROUND * varies * as_recorded)
             && parts.iter().all(|part| {
-                let with_it = ln_radius(run, part);
-                let does: Vec<f64> = with_it.iter().zip(&recorded).map(|(a, b)| a - b).collect();
+                let (with_it, own) = (ln_radius(run, part), size(run, part));
+                let does: Vec<f64> = with_it.iter().zip(&recorded).map(|(a, b)| a * own - b * as_recorded).collect();
                 let does = root_mean_square(&does);
-                does <= LEAST || SHOWN * does <= varies
+                does <= LEAST * own || SHOWN * does <= varies * as_recorded
             })
     })
 }
 
-/// Mean distance of a run's readings from nothing, in their unit.
-fn size(run: &SensorRun) -> f64 {
+/// Radius of what is behind a run's readings, geometric mean, in their unit.
+fn size(run: &SensorRun, readout: &Readout) -> f64 {
     let all = run.channels().unwrap_or_default();
-    all.iter().map(|[x, y]| x.hypot(*y)).sum::<f64>() / all.len().max(1) as f64
+    let mean = all.iter().map(|z| readout.ln_radius(*z)).sum::<f64>() / all.len().max(1) as f64;
+    readout.amplitude * mean.exp()
 }
 
 /// The causes in a readout, each by itself: offsets, gain, skew, cubics, every effect as text.

@@ -3,9 +3,10 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::readout::{LARGEST_AXES_RATIO, Readout};
+use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::numerics::linear::NormalEquations;
+use crate::report::calibration::LARGEST_RATIO_OF_A_SENSOR;
 
 /// The algebraic ellipse through the points of all runs: a x² + b xy + c y² + d x + e y = 1 by least squares.
 pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {
@@ -70,7 +71,7 @@ pub(crate) fn by_reference(runs: &[SensorRun], harmonic_gain: f64) -> Option<Rea
 fn from_second_moments(centre: [f64; 2], size: f64, second: &Matrix2<f64>) -> Option<Readout> {
     let (xx, xy, yy) = (second[(0, 0)], second[(0, 1)], second[(1, 1)]);
     let eigen = second.symmetric_eigenvalues();
-    if !(eigen.min() > 0.0 && xx > 0.0) || (eigen.max() / eigen.min()).sqrt() > LARGEST_AXES_RATIO {
+    if !(eigen.min() > 0.0 && xx > 0.0) || (eigen.max() / eigen.min()).sqrt() > LARGEST_RATIO_OF_A_SENSOR {
         return None;
     }
     // y = g (sin + s cos): yy/xx = g²(1 + s²), xy/xx = g s

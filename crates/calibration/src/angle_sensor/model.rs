@@ -136,7 +136,8 @@ impl SensorModel {
         let mut predicted = selected.losses.rms();
         let left = by_run(&samples, runs.len(), |s| table.left(s));
         let unknowns = readout.as_ref().map_or(0, |r| r.0.free().len()) + shape.size();
-        let mut stands = autoregression::gain(&raw_errors, &left, unknowns) > 0.0;
+        let raw_turns = selection.raw_turns();
+        let mut stands = !raw_turns || autoregression::gain(&raw_errors, &left, unknowns) > 0.0;
         if !stands && let Some((shape, losses)) = selection.across_gaps(&selected.model) {
             // where rows are dense and the sensor rests, memory follows any error; this is predicted where no memory reaches
             table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)?;

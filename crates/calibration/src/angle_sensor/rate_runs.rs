@@ -55,7 +55,10 @@ pub(super) fn believed(
     // a run that rests tells none
     let is_told = |[_, deviation]: &&[f64; 2]| DEVIATIONS * deviation < 0.5 * scale.abs();
     let mut told: Vec<f64> = gains.iter().flatten().filter(is_told).map(|[gain, _]| *gain).collect();
-    let common = if told.is_empty() { scale } else { median(&mut told) };
+    let (common, whose) = match told.len() {
+        0 => (scale, "that of a rate gyroscope"),
+        _ => (median(&mut told), "that of the other runs"),
+    };
     if !(0.5..2.0).contains(&(common / scale).abs()) {
         return Err(Refusal::no_answer(
             "campaign",
@@ -71,8 +74,10 @@ pub(super) fn believed(
                 (gain - common).abs() > (SHARE * common.abs()).max(DEVIATIONS * deviation)
             };
             let [gain, _] = gain.filter(is_odd)?;
+            let is_reversed = (gain + common).abs() < SHARE * common.abs();
+            let reversed = if is_reversed { ": with the sign of either turned they agree" } else { "" };
             Some(format!(
-                "its angle turns {gain:.4} times as far as the reference, that of the other runs {common:.4} times"
+                "its angle turns {gain:.4} times as far as the reference, {whose} {common:.4} times{reversed}"
             ))
         })
     };

@@ -12,6 +12,7 @@ use cvg_model::Envelope;
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Role, Values};
 
 use super::rails::Rails;
+use crate::report::calibration::LARGEST_RATIO_OF_A_SENSOR;
 
 /// Which of the parameters are there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -72,8 +73,6 @@ pub(crate) enum Unknown {
     Text(usize, usize),
 }
 
-/// Largest ratio of the axes of an ellipse that still has an angle: engineering choice.
-pub(crate) const LARGEST_AXES_RATIO: f64 = 30.0;
 /// Largest skew and cubic that leave a readout with an inverse: beyond, c(u) turns back within the circle.
 const LARGEST_SKEW: f64 = 5.0;
 const LARGEST_CUBIC: f64 = 0.4;
@@ -240,7 +239,7 @@ impl Readout {
     /// The parameters leave an ellipse with an angle and a cubic with an inverse.
     pub(crate) fn is_sound(&self) -> bool {
         self.p.iter().chain(self.texts.iter().flat_map(|t| &t.1)).all(|v| v.is_finite())
-            && self.p[2].abs() < LARGEST_AXES_RATIO.ln()
+            && self.p[2].abs() < LARGEST_RATIO_OF_A_SENSOR.ln()
             && self.p[3].abs() < LARGEST_SKEW
             && self.cubics().iter().all(|k| k.abs() < LARGEST_CUBIC)
     }

@@ -20,7 +20,7 @@ use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member};
 use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::statistics::{line, median, robust_deviation, span};
-use crate::recording::{Campaign, Instrument, Reference, Run};
+use crate::recording::{Campaign, Instrument, Reference, Role, Run};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::survey::{Constancy, Radius};
 use crate::report::{EffectReport, Estimate, Status, Tool, provenance};
@@ -32,6 +32,9 @@ const FEWEST_ROWS: usize = 24;
 const FEWEST_HELD_ROWS: usize = 4;
 /// A part of the turn this long without a row leaves an ellipse to be guessed, deg.
 const LARGEST_GAP_DEG: f64 = 180.0;
+/// … and this long, the radius of the rows that stand there alone says nothing of an ellipse; then stretches are held out, so many a run.
+const LARGEST_GAP_BEFORE_A_QUARTER_DEG: f64 = 60.0;
+const STRETCHES: usize = 24;
 /// … and this long, a cubic.
 const LARGEST_GAP_OF_A_CUBIC_DEG: f64 = 60.0;
 /// What the best curve may leave of the radius, rms: engineering choice.
@@ -80,7 +83,16 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
     let mut warnings = Vec::new();
     let runs = without_spikes(runs.collect::<Result<_, _>>()?, std::f64::consts::TAU, &mut warnings);
-    let (fitted, held) = apart(of_one_sensor(runs, &mut warnings)?)?;
+    let runs = of_one_sensor(runs, &mut warnings)?;
+    let (mut fitted, mut held) = apart(runs.clone())?;
+    if runs.iter().all(|run| run.role == Role::Fit) && one_turn_only(&runs, &fitted) {
+        (fitted, held) = stretches_apart(&runs);
+        warnings.push(
+            "the channels go round once, and the last quarter of the rows is where no other rows are: every fourth of 24 stretches is \
+             held out instead; a recording that goes round twice is judged on its last quarter"
+                .into(),
+        );
+    }
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
         return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));
@@ -88,20 +100,28 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let thinned: Vec<SensorRun> = fitted.iter().map(|r| r.thinned((count(&fitted) / ENOUGH_ROWS).max(1))).collect();
     let rails = Rails::of(fitted.iter().filter_map(SensorRun::channels).flatten());
     let (readout, predicted, predicted_raw) = choose_readout(&thinned, rails)?;
-    let largest_gap_deg = largest_gap(&readout, &fitted).to_degrees();
+    let centre = ellipse::algebraic(&fitted).filter(|_| readout.kind == Kind::Plain);
+    let largest_gap_deg = largest_gap(centre.as_ref().unwrap_or(&readout), &fitted).to_degrees();
     if largest_gap_deg > LARGEST_GAP_DEG {
         let what = format!("the channels cover {:.0}° of a turn only", 360.0 - largest_gap_deg);
         return Err(refuse(what, "rows all around the turn, or a reference: table_deg or rate_dps"));
     }
     let deviations = deviations(&readout, &thinned);
     let plain = Readout { rails, ..Readout::plain() };
-    let (before, after) = (constancy(&plain, &held), constancy(&readout, &held));
-    let neutral = readout.kind == Kind::Plain || after.rms >= before.rms;
+    let (mut before, after) = (constancy(&plain, &held), constancy(&readout, &held));
+    let raw_turns = turns(&readout);
+    if !raw_turns {
+        // as a share of what turns, and not of how far off that is
+        let scale = mean_radius(&plain, &held) / (readout.amplitude * readout.radius);
+        before = Constancy { rms: before.rms * scale, peak: before.peak * scale };
+    }
+    let neutral = readout.kind == Kind::Plain || (raw_turns && after.rms >= before.rms);
+    let as_recorded =
+        predicted_raw.map_or("as recorded the angle does not turn".into(), |rms| format!("{rms:.2e} as recorded"));
     let evidence = format!(
         "blocked cross-validation within the fitted rows leaves {predicted:.2e} of the radius with all that was found, \
-         {predicted_raw:.2e} as recorded; interval by jackknife over {BLOCKS} blocks"
+         {as_recorded}; interval by jackknife over {BLOCKS} blocks"
     );
-    let raw_turns = turns(&readout);
     let values = LibraryReadout::from(&readout).values();
     let half = STUDENT_19 * deviations[2];
     let told = !neutral && readout.kind >= Kind::Affine && half.is_finite();
@@ -162,6 +182,24 @@ fn refuse(what: String, wanted: &str) -> Refusal {
     Refusal::no_answer("campaign", what, wanted)
 }
 
+/// Whether the last quarter of the rows stands where the rows before it do not, in a turn that all of them go round.
+fn one_turn_only(runs: &[SensorRun], fitted: &[SensorRun]) -> bool {
+    let [all, fitted] =
+        [runs, fitted].map(|rows| ellipse::algebraic(runs).map_or(TAU, |centre| largest_gap(&centre, rows)));
+    let widest = LARGEST_GAP_BEFORE_A_QUARTER_DEG.to_radians();
+    all < widest && fitted > widest
+}
+
+/// Every fourth of [`STRETCHES`] of each run, and the rest.
+fn stretches_apart(runs: &[SensorRun]) -> (Vec<SensorRun>, Vec<SensorRun>) {
+    let part = |run: &SensorRun, is_held: bool| {
+        let of = |i: &usize| (i * STRETCHES / run.len() % 4 == 3) == is_held;
+        run.subset(&(0..run.len()).filter(of).collect::<Vec<_>>())
+    };
+    let held = |run: &SensorRun| SensorRun { role: Role::Holdout, ..part(run, true) };
+    (runs.iter().map(|run| part(run, false)).collect(), runs.iter().map(held).collect())
+}
+
 /// What nobody can see without a reference, in words.
 fn unseen(raw_turns: bool, readout: &Readout) -> Vec<String> {
     let mut out = vec![
@@ -184,8 +222,8 @@ fn unseen(raw_turns: bool, readout: &Readout) -> Vec<String> {
 }
 
 /// The simplest readout that predicts the radius of rows it was not fitted to as well as the best does; with the rms that
-/// it leaves, and that of the channels as they are.
-fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64), Refusal> {
+/// it leaves, and that of the channels as they are, where they go round the origin.
+fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, Option<f64>), Refusal> {
     let no_ellipse = || refuse("the channels draw no ellipse".into(), "two channels that read a cosine and a sine");
     let start = Readout { rails, ..ellipse::algebraic(runs).ok_or_else(no_ellipse)? };
     let folds = Folds::interleaved(runs);
@@ -197,10 +235,15 @@ fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64
         fit(kind, Weighting::Radius, runs, 1.0, &start).map(|f| f.readout)
     };
     let gap = largest_gap(&start, runs).to_degrees();
+    // about an origin far outside of the curve any radius is constant
+    let may_be = |kind: &Kind| match kind {
+        Kind::Plain => start.is_about_the_origin(),
+        kind => *kind < Kind::Cubic || gap < LARGEST_GAP_OF_A_CUBIC_DEG,
+    };
     let kinds = [Kind::Plain, Kind::Offset, Kind::Affine, Kind::Cubic];
     let candidates: Vec<Candidate<Kind>> = kinds
         .into_iter()
-        .filter(|kind| *kind < Kind::Cubic || gap < LARGEST_GAP_OF_A_CUBIC_DEG)
+        .filter(may_be)
         .filter_map(|kind| {
             let losses = losses_of_radius(|fold| fitted(kind, &folds.without(runs, fold)), &folds, runs)?;
             Some(Candidate { size: kind.free().len(), texts: 0, model: kind, losses, of_radius: None })
@@ -213,7 +256,7 @@ fn choose_readout(runs: &[SensorRun], rails: Rails) -> Result<(Readout, f64, f64
             "two channels that read a cosine and a sine",
         ));
     }
-    let raw = candidates.iter().find(|c| c.model == Kind::Plain).map_or(f64::NAN, |c| c.losses.rms());
+    let raw = candidates.iter().find(|c| c.model == Kind::Plain).map(|c| c.losses.rms());
     Ok((fitted(chosen.model, runs).ok_or_else(no_ellipse)?, chosen.losses.rms(), raw))
 }
 

@@ -193,7 +193,7 @@ pub(crate) fn apart(runs: Vec<SensorRun>) -> Result<(Vec<SensorRun>, Vec<SensorR
         return Err(Refusal::no_answer(
             "campaign",
             format!("no run has {FEWEST_ROWS} rows to fit"),
-            "a longer recording",
+            "more stations, twelve at least, or a longer recording",
         ));
     }
     Ok((fit, held.into_iter().filter(|r| r.len() > 1).collect()))

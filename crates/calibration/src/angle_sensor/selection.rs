@@ -129,7 +129,8 @@ impl<'a> Selection<'a> {
         let fronts = if self.channels() { self.readouts(&mut pool) } else { vec![None] };
         let Some(first) = fronts.first() else { return Vec::new() };
         let constant = Shape::constant(self.sensor.free_gain);
-        let raw = self.losses_of(&plain, &constant);
+        // an angle that does not turn is nothing to be better than
+        let raw = if self.raw_turns() { self.losses_of(&plain, &constant) } else { None };
         let motions = self.motions(first);
         pool.extend(self.offer(&fronts, &self.shapes(&ORDERS, &motions, &[])));
         self.without_barely_carried(&mut pool);
@@ -208,7 +209,7 @@ impl<'a> Selection<'a> {
     /// among themselves, so that they take no other's place.
     fn readouts(&mut self, pool: &mut Vec<Candidate<Model>>) -> Vec<Option<Front>> {
         let coarse = self.shapes(&COARSE_ORDERS, &[Motion::None], &[]);
-        let mut fronts = if self.sensor.free_gain && !self.raw_turns() { Vec::new() } else { vec![Some(PLAIN)] };
+        let mut fronts = if self.raw_turns() { vec![Some(PLAIN)] } else { Vec::new() };
         if !self.starts.is_empty() {
             fronts.extend(self.fitted_fronts().into_iter().map(Some));
         }
@@ -237,9 +238,9 @@ impl<'a> Selection<'a> {
         finalists
     }
 
-    /// The raw angle may turn: the origin may lie within what the channels draw. One that does not, and an angular gain that is free, end at
-    /// a gain of nothing beside a table that takes the angle away.
-    fn raw_turns(&self) -> bool {
+    /// The raw angle may turn: the origin may lie within what the channels draw. Beside a free gain one that does not ends at a gain of
+    /// nothing, and its error goes up with the reference, more smoothly than any noise.
+    pub(super) fn raw_turns(&self) -> bool {
         self.starts.is_empty() || self.starts.iter().any(Readout::is_about_the_origin)
     }
 

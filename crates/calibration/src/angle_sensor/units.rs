@@ -151,8 +151,13 @@ pub(super) fn require_degrees(run: &Run, period: f64) -> Result<(), Refusal> {
             ));
         }
     }
-    let round =
-        |v: &Vec<f64>| median(&mut v.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>()) > 0.5 * TURN_DEG;
+    let round = |v: &Vec<f64>| {
+        let steps: Vec<f64> = v.windows(2).map(|w| w[1] - w[0]).collect();
+        let back = steps.iter().filter(|step| **step < 0.0).count();
+        // stations in any order go to and fro
+        let is_followed = 4 * back.min(steps.len() - back) < steps.len();
+        is_followed && median(&mut steps.iter().map(|step| step.abs()).collect::<Vec<_>>()) > 0.5 * TURN_DEG
+    };
     let Some(column) = [(REFERENCE, &table), (ANGLE, &theta)].into_iter().find(|(_, v)| v.as_ref().is_some_and(round))
     else {
         return Ok(());

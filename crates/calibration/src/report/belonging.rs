@@ -38,6 +38,8 @@ const LARGEST_LEFT_IN_THE_RADIUS: f64 = 0.02;
 /// A calibration that leaves less than this share with the sign of the angle turned is of an angle that counts the other way:
 /// engineering choice.
 const MIRRORED: f64 = 0.5;
+/// An angle that turns by less than this share of what its reference asks for, or by as much more, does not turn with it.
+const STANDS_STILL: f64 = 0.5;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
 /// … where what of the radius goes with the angle is not within this factor of what the calibration left where it was made.
@@ -198,7 +200,8 @@ fn followed(rows: &[Row], gain: f64, period: f64, after: usize) -> Vec<f64> {
     unwrapped(rows.iter().map(|r| wrapped(r.angle_rad[after] - gain * r.input_rad, period)), period)
 }
 
-/// Robust deviation of the angle from the best line over reference and time, rad.
+/// Robust deviation of the angle from the best line over reference and time, rad; anything where it does not turn with the reference, as
+/// that of channels about an origin that they do not go round.
 fn angle_error(rows: &[Row], gain: f64, period: f64, after: usize) -> f64 {
     let error = followed(rows, gain, period, after);
     let mut equations = NormalEquations::new(3);
@@ -206,6 +209,10 @@ fn angle_error(rows: &[Row], gain: f64, period: f64, after: usize) -> f64 {
     let row = |r: &Row| [1.0, r.input_rad, r.t_s - first_s];
     rows.iter().zip(&error).for_each(|(r, e)| equations.add(&row(r), *e));
     let x = equations.solve();
+    let input: Vec<f64> = rows.iter().map(|r| r.input_rad).collect();
+    if line(&input, &error).0.abs() > STANDS_STILL * gain.abs() {
+        return f64::INFINITY;
+    }
     let left = |(r, e): (&Row, &f64)| e - row(r).iter().zip(&x).map(|(a, b)| a * b).sum::<f64>();
     robust_deviation(rows.iter().zip(&error).map(left))
 }

@@ -242,11 +242,19 @@ impl Calibration {
     }
 }
 
-/// A value is one that the parameter can have. The library's bounds are of volts; what a sensor's channels are in, millivolts or
-/// the counts of a converter, nobody says.
-fn is_within(parameter: &Parameter, instrument: Instrument, value: f64) -> bool {
-    let any_unit = instrument == Instrument::Sensor && parameter.unit.contains('V');
-    value.is_finite() && (any_unit || (parameter.lower..=parameter.upper).contains(&value))
+/// The largest ratio of the gains of two channels, of which each may be in a unit of its own, that leaves an angle: engineering choice.
+pub(crate) const LARGEST_RATIO_OF_A_SENSOR: f64 = 30.0;
+
+/// A value is one that the parameter can have. The library's bounds are of volts, and of two channels that were made alike; what a
+/// sensor's channels are in, millivolts or the counts of a converter, nobody says.
+fn is_within(id: EffectId, parameter: &Parameter, instrument: Instrument, value: f64) -> bool {
+    let sensor = instrument == Instrument::Sensor;
+    let bounds = match id {
+        _ if sensor && parameter.unit.contains('V') => f64::NEG_INFINITY..=f64::INFINITY,
+        EffectId::DetectionGainMismatch if sensor => LARGEST_RATIO_OF_A_SENSOR.recip()..=LARGEST_RATIO_OF_A_SENSOR,
+        _ => parameter.lower..=parameter.upper,
+    };
+    value.is_finite() && bounds.contains(&value)
 }
 
 fn member(entry: &EffectEntry, instrument: Instrument, name: &str) -> Result<Member, Refusal> {
@@ -267,7 +275,7 @@ fn member(entry: &EffectEntry, instrument: Instrument, name: &str) -> Result<Mem
     let mut values = id.neutral::<f64>();
     for (key, value) in &entry.parameters {
         let at = parameters.iter().position(|p| p.name == key);
-        let sound = at.is_some_and(|i| is_within(&parameters[i], instrument, *value));
+        let sound = at.is_some_and(|i| is_within(id, &parameters[i], instrument, *value));
         let (Some(i), true) = (at, sound) else {
             return Err(Refusal::new(
                 name,
