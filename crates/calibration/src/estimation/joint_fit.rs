@@ -14,7 +14,7 @@ use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
-use crate::numerics::statistics::{median, robust_deviation, white_noise};
+use crate::numerics::statistics::{median, robust_deviation, root_mean_square, white_noise};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
 
 /// Beliefs before the data: what a whole-angle gyroscope can plausibly be. They matter only where the data is silent.
@@ -34,7 +34,8 @@ const SPIKE: f64 = 6.0;
 const BALANCE_NOISE: f64 = 1e-3;
 pub(super) const BALANCE_SHARE: f64 = 0.3;
 const BALANCE_SHARE_ALONE: f64 = 3.0;
-/// How far below the usual misfit of all runs, as a share of it, one run's is believed.
+/// How far below the misfit of all runs, rms, as a share of it, one run's is believed: the median of three is small where two are fitted at
+/// the cost of the third.
 const LARGEST_LEAD: f64 = 0.3;
 /// How well a search places a line, as a share of its width, one over the longest run.
 const LINE_SHARE: f64 = 0.1;
@@ -390,15 +391,8 @@ impl Dataset {
                 amplitude: robust_deviation(segments.iter().flat_map(|s| s.amplitude.iter().copied())),
             }));
         }
-        let excess = |p: &Prepared, n: &Noise| n.angle / p.white.angle;
-        let usual = median(
-            &mut self
-                .tracks
-                .iter()
-                .zip(&left)
-                .filter_map(|(p, n)| n.as_ref().map(|n| excess(p, n)))
-                .collect::<Vec<_>>(),
-        );
+        let excess = |(p, n): (&Prepared, &Option<Noise>)| n.as_ref().map(|n| n.angle / p.white.angle);
+        let usual = root_mean_square(&self.tracks.iter().zip(&left).filter_map(excess).collect::<Vec<_>>());
         for (prepared, left) in self.tracks.iter_mut().zip(left) {
             let Some(left) = left else { continue };
             // Weights follow what is really left, so that a misfit cannot outvote a prior or another run; but a run

@@ -2,14 +2,17 @@
 //! and what is left.
 
 use crate::diagnostics::drives::clipping;
+use crate::diagnostics::evaluate::evaluate;
 use crate::diagnostics::scale_factor::scale_factor_of;
 use crate::error::Refusal;
-use crate::estimation::joint_fit::{Dataset, declared_hypothesis, fit_with_ring_downs};
+use crate::estimation::fit::Fit;
+use crate::estimation::joint_fit::{Dataset, Fitted, declared_hypothesis, fit_with_ring_downs};
+use crate::estimation::residuals::Window;
 use crate::identified::{Identification, Options};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::rate_table::errors::Errors;
 use crate::rate_table::report::{Found, Head};
-use crate::recording::Campaign;
+use crate::recording::{Campaign, Role};
 use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::selection::discovery::discover;
@@ -58,7 +61,14 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         let mut clipped = declared_fit.hypothesis.clone();
         let member = clipped.admit(EffectId::DriveSaturation, Origin::Declared);
         clipped.members[member].values[0] = found.inverse_level.value;
-        (declared_fit, fitted, steps) = explained(&mut dataset, &clipped)?;
+        let anew = explained(&mut dataset, &clipped)?;
+        if left(&dataset, &anew.1) <= WORSE * left(&dataset, &fitted) {
+            (declared_fit, fitted, steps) = anew;
+        } else {
+            // a level that the angle refutes is none
+            dataset.clipping = None;
+            dataset.restore(&fitted);
+        }
     }
     (options.progress)("weighing by what the noise remembers");
     let mut covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
@@ -75,4 +85,13 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let drives = dataset.clipping.and_then(|_| clipping(&dataset, &fitted.fit.hypothesis)?.report());
     let found = Found { dataset, declared_fit, fitted, covariance, with_hidden, steps, scale_factor, errors, drives };
     found.report(head, warnings, with_plots)
+}
+
+/// A fit with drives that clip may leave this many times the mean square of the fitted runs that the one without leaves: engineering choice.
+const WORSE: f64 = 1.1;
+
+/// Mean square of what a fit leaves of the fitted runs.
+fn left(dataset: &Dataset, fitted: &Fitted) -> f64 {
+    let Fit { hypothesis, starts, .. } = &fitted.fit;
+    evaluate(&dataset.tracks, hypothesis, starts, Role::Fit, Window::Whole, None).mean_square()
 }

@@ -2,32 +2,47 @@
 //! many deviations where the campaign hardly tells it apart: every interval has to hold that as far as the effect is likely to be there
 //! (Bayesian model averaging, Hoeting, Madigan, Raftery and Volinsky 1999, over the model at hand and each that has one effect more).
 
+use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimation::fit::{Fit, Prior, scaled_inverse};
 use crate::estimation::generalised_least_squares::linearised;
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::normal::Normal;
-use crate::model::hypothesis::{Origin, Unknown};
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Instrument;
 use crate::selection::candidates::Candidate;
 use crate::selection::together::causes;
 use crate::selection::trial::extend;
 
-/// Adds to the covariance of a fit's unknowns what the causes that the campaign could name, and did not, may have moved them by.
-/// Where all runs are at one rate, in one sense, what they do not tell apart is said of the effects that are declared.
+/// The axes of the readout are at right angles within this, rad, before the data, and those of the drives, of which nothing tells how much
+/// they put out either: engineering choices.
+const READOUT_ASKEW: f64 = 0.02;
+const DRIVES_ASKEW: f64 = 0.05;
+
+/// Adds to the covariance of a fit's unknowns what the causes that the campaign could name, and did not, may have moved them by. Where all
+/// runs are at one rate, in one sense, no cause can be named: then it is what the drives, or the readout that points them, may turn the
+/// pattern by, which a single rate takes for angular gain. What else such runs do not tell apart is said of the effects that are declared.
 pub(crate) fn with_what_was_not_found(
     dataset: &mut Dataset,
     fitted: &Fitted,
     covariance: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    if dataset.instrument == Instrument::Sensor || !dataset.tracks_differ() {
-        return covariance.clone();
-    }
-    let missing = causes(dataset, &fitted.fit.hypothesis, fitted);
+    let missing = match dataset.instrument {
+        Instrument::Sensor => return covariance.clone(),
+        _ if dataset.tracks_differ() => causes(dataset, &fitted.fit.hypothesis, fitted),
+        _ => askew(&fitted.fit.hypothesis),
+    };
     dataset.balance_damping(&fitted.fit.hypothesis);
     let Some(models) = Models::around(dataset, fitted, &missing) else { return covariance.clone() };
     models.others.iter().filter_map(|other| models.moved_by(other)).fold(covariance.clone(), |all, by| all + by)
+}
+
+/// The skews that a hypothesis lacks.
+fn askew(hypothesis: &Hypothesis) -> Vec<Candidate> {
+    let lacking =
+        [EffectId::DetectionSkew, EffectId::ActuationSkew].into_iter().filter(|id| hypothesis.member(*id).is_none());
+    lacking.map(|id| Candidate { id, values: id.neutral(), refine: None, tried: 1.0 }).collect()
 }
 
 /// One linearisation for the fitted model and for each that has one effect more.
@@ -44,10 +59,15 @@ struct Models {
 impl Models {
     fn around(dataset: &Dataset, fitted: &Fitted, missing: &[Candidate]) -> Option<Self> {
         let all = missing.iter().fold(fitted.fit.hypothesis.clone(), |h, c| extend(&h, c, Origin::Discovered));
-        let unknowns = dataset.unknowns(&all);
+        let mut unknowns = dataset.unknowns(&all);
+        let ratio = all.position(EffectId::ActuationGainMismatch).map(|member| Unknown::Effect(member, 0));
+        // held while the drives are, and as wrong as it may be
+        let held_ratio = ratio.filter(|ratio| !dataset.tracks_differ() && !unknowns.contains(ratio));
+        unknowns.extend(held_ratio);
         let is_of = |c: &Candidate, u: &Unknown| matches!(u, Unknown::Effect(m, _) if all.members[*m].id == c.id);
-        let others: Vec<Vec<usize>> =
+        let mut others: Vec<Vec<usize>> =
             missing.iter().map(|c| (0..unknowns.len()).filter(|&i| is_of(c, &unknowns[i])).collect()).collect();
+        others.extend(held_ratio.map(|_| vec![unknowns.len() - 1]));
         let own: Vec<usize> = (0..unknowns.len()).filter(|i| !others.iter().any(|o| o.contains(i))).collect();
         if own.len() != fitted.fit.unknowns.len() {
             return None;
@@ -61,10 +81,18 @@ impl Models {
                 continue;
             }
             let d = all.members[member].id.description();
-            let deviation = d.parameters[p].scale * amplitude.powi(-i32::from(d.scaling.amplitude));
+            let size = match all.members[member].id {
+                EffectId::DetectionSkew if !dataset.tracks_differ() => READOUT_ASKEW,
+                EffectId::ActuationSkew if !dataset.tracks_differ() => DRIVES_ASKEW,
+                _ => d.parameters[p].scale,
+            };
+            let deviation = size * amplitude.powi(-i32::from(d.scaling.amplitude));
             priors.push(Prior { unknown, mean: d.parameters[p].neutral, deviation, considered: false });
         }
-        let held = own.iter().map(|&i| Prior::considered_deviation(&priors, unknowns[i]).is_some()).collect();
+        // at one rate what is held, lest it be dragged along, is all that a cause could hide behind
+        let is_held =
+            |&i: &usize| Prior::considered_deviation(&priors, unknowns[i]).is_some() && dataset.tracks_differ();
+        let held = own.iter().map(is_held).collect();
         let fit = Fit { hypothesis: all, unknowns, ..fitted.fit.clone() };
         Some(Self { equations: linearised(&dataset.tracks, &fit, &priors)?, own, held, others })
     }
