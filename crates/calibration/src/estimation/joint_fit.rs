@@ -34,9 +34,10 @@ const SPIKE: f64 = 6.0;
 const BALANCE_NOISE: f64 = 1e-3;
 pub(super) const BALANCE_SHARE: f64 = 0.3;
 const BALANCE_SHARE_ALONE: f64 = 3.0;
-/// How far below the misfit of all runs, rms, as a share of it, one run's is believed: the median of three is small where two are fitted at
-/// the cost of the third.
+/// How far below the usual misfit of all runs, as a share of it, one run's is believed.
 const LARGEST_LEAD: f64 = 0.3;
+/// A run of which this many times the usual misfit is left is given up.
+const GIVEN_UP: f64 = 10.0;
 /// How well a search places a line, as a share of its width, one over the longest run.
 const LINE_SHARE: f64 = 0.1;
 /// The smallest noise that is believed, rad: rounding of the angle itself.
@@ -71,6 +72,8 @@ pub(crate) struct Dataset {
     pub(crate) drive_is_free: bool,
     /// fits begin with it free and where the hypothesis has it: nothing is missing that would drag it along
     pub(crate) drive_is_free_at_once: bool,
+    /// the usual misfit of the runs is their rms and not their median, which is small where two of three are fitted at the cost of the third
+    pub(crate) counts_every_run: bool,
     /// which runs are in, and which were left out and why
     pub(crate) screen: Screen,
 }
@@ -156,6 +159,7 @@ impl Dataset {
             clipping: None,
             drive_is_free: false,
             drive_is_free_at_once: false,
+            counts_every_run: false,
             screen,
         })
     }
@@ -190,6 +194,13 @@ impl Dataset {
     pub(crate) fn excess(&self) -> f64 {
         let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
         median(&mut fitted.map(|p| p.noise.angle / p.white.angle).collect::<Vec<_>>())
+    }
+
+    /// Whether a fit leaves far more of one run than of most.
+    pub(crate) fn gives_a_run_up(&self) -> bool {
+        let fitted = self.tracks.iter().filter(|p| p.track.samples(Role::Fit) > 0);
+        let largest = fitted.map(|p| p.noise.angle / p.white.angle).fold(0.0, f64::max);
+        largest > GIVEN_UP * self.excess().max(1.0)
     }
 
     /// The median of the fitted runs' mean amplitudes, V.
@@ -392,7 +403,8 @@ impl Dataset {
             }));
         }
         let excess = |(p, n): (&Prepared, &Option<Noise>)| n.as_ref().map(|n| n.angle / p.white.angle);
-        let usual = root_mean_square(&self.tracks.iter().zip(&left).filter_map(excess).collect::<Vec<_>>());
+        let mut all: Vec<f64> = self.tracks.iter().zip(&left).filter_map(excess).collect();
+        let usual = if self.counts_every_run { root_mean_square(&all) } else { median(&mut all) };
         for (prepared, left) in self.tracks.iter_mut().zip(left) {
             let Some(left) = left else { continue };
             // Weights follow what is really left, so that a misfit cannot outvote a prior or another run; but a run

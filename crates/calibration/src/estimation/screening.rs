@@ -272,12 +272,14 @@ impl Screen {
             self.counts_as_stated(&moving)?;
         }
         let only = |m: &Motion| format!("the pattern turns through {:.1}° only", m.travel.to_degrees());
-        let is_short = |(track, m): &(Track, Motion)| track.samples(Role::Fit) == 0 && m.travel < std::f64::consts::PI;
+        let is_far = |m: &Motion| m.travel >= std::f64::consts::PI;
+        let one_is_fitted = moving.iter().any(|(track, m)| track.samples(Role::Fit) > 0 && is_far(m));
+        let is_short = |(_, m): &(Track, Motion)| one_is_fitted && !is_far(m);
         let short = moving.iter().enumerate().filter(|(_, run)| is_short(run)).map(|(at, (_, m))| (at, only(m)));
         let short: Vec<(usize, String)> = short.collect();
         let moving = self.without(moving, &short, warnings);
         let far_enough = |(track, motion): (Track, Motion)| {
-            if motion.travel >= std::f64::consts::PI {
+            if is_far(&motion) {
                 return Ok((track, motion));
             }
             Err(Refusal::new(&track.name, only(&motion), "at least half a turn (180°)"))

@@ -46,6 +46,17 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
         Ok::<_, Refusal>((declared_fit, fitted, steps))
     };
     let (mut declared_fit, mut fitted, mut steps) = explained(&mut dataset, &paper)?;
+    if dataset.gives_a_run_up() {
+        (options.progress)("beginning anew with every run counted");
+        dataset.counts_every_run = true;
+        let anew = explained(&mut dataset, &paper)?;
+        if left(&dataset, &anew.1) < left(&dataset, &fitted) {
+            (declared_fit, fitted, steps) = anew;
+        } else {
+            dataset.counts_every_run = false;
+            dataset.restore(&fitted);
+        }
+    }
     if dataset.without_foreign_ring_downs(&fitted.fit.hypothesis)? {
         (options.progress)("beginning anew without the ring-downs of another device");
         (declared_fit, fitted, steps) = explained(&mut dataset, &paper)?;

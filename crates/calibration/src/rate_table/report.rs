@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::PlotContext;
-use crate::diagnostics::temperature::{Seen, temperature};
+use crate::diagnostics::temperature::{LEAST_SPAN_K, Seen, temperature};
 use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
@@ -185,12 +185,20 @@ impl Found {
     /// Parameters that follow the temperature and are stated at one that was not recorded, nor nearly.
     fn extrapolated(&self) -> Option<String> {
         let h = &self.fitted.fit.hypothesis;
-        let reference_c = h.reference_c.filter(|_| h.members.iter().any(|m| m.id.by_temperature()))?;
+        let reference_c = h.reference_c?;
         let of = |pick: fn(f64, f64) -> f64, from: f64| {
             self.dataset.tracks.iter().flat_map(|t| t.track.temperatures_c()).fold(from, pick)
         };
         let (low, high) = (of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY));
         let beyond = (low - reference_c).max(reference_c - high);
+        if !h.members.iter().any(|m| m.id.by_temperature()) {
+            return (beyond.is_finite() && beyond > LEAST_SPAN_K).then(|| {
+                format!(
+                    "the runs were recorded between {low:.1} and {high:.1} °C, and what follows the temperature is not told: what is stated is \
+                     of these temperatures and not of the {reference_c:.1} °C of temperature_c; runs at other temperatures, with temp_c, would tell"
+                )
+            });
+        }
         (beyond > EXTRAPOLATED_K).then(|| {
             format!(
                 "what follows the temperature is stated at {reference_c:.1} °C (temperature_c) and was recorded between \
