@@ -2,7 +2,7 @@
 //! no turn of the sensor's by a few permille. Nobody's calibration has it, and a held-out run is judged about its own line; a table
 //! that is fitted about a constant would be fitted to the drift, and where that is large nothing would be found at all.
 //!
-//! $$e_i = c_r + d_r t_i + \\sum_n (a_n \\cos nφ_i + b_n \\sin nφ_i) + λ\\dot φ_i$$
+//! $$e_i = c_r + d_r t_i + \\sum_n (a_n \\cos nφ_i + b_n \\sin nφ_i) + λ\\dot φ_i + β\\operatorname{sign}\\dot φ_i$$
 //!
 //! r is the run; the drifts d_r are what is left of e regressed on what is left of t, both beside all else (Frisch and Waugh 1933).
 
@@ -108,7 +108,7 @@ impl Rows {
         let poles = sensor.cycles_per_turn();
         let of_the_period = (1..=OF_THE_PERIOD).map(|n| f64::from(n) * poles).filter(|n| *n > f64::from(OF_THE_TURN));
         let harmonics: Vec<f64> = (1..=OF_THE_TURN).map(f64::from).chain(of_the_period).collect();
-        let unknowns = 2 * runs.len() + 2 * harmonics.len() + 1;
+        let unknowns = 2 * runs.len() + 2 * harmonics.len() + 2;
         if drifting.is_empty() || samples.len() < ROWS_PER_UNKNOWN * unknowns {
             return None;
         }
@@ -116,7 +116,10 @@ impl Rows {
             let mut row = vec![0.0; runs.len()];
             row[s.run] = 1.0;
             row.extend(harmonics.iter().flat_map(|n| <[f64; 2]>::from((n * s.reference).sin_cos())));
-            row.extend(varies.then_some(s.rate));
+            // a lag, and play: what changes its sign half-way goes with the time
+            row.extend(
+                varies.then_some([s.rate, if s.rate == 0.0 { 0.0 } else { s.rate.signum() }]).into_iter().flatten(),
+            );
             row
         };
         Some(Self {

@@ -106,22 +106,7 @@ pub(crate) fn identify(
     let across = cross_axis::take(&mut campaign);
     (options.progress)("preparing the runs");
     let mut left_out: Vec<String> = rate.said().into_iter().collect();
-    for run in campaign.runs.iter_mut().filter(|run| run.kind == RunKind::Rotation) {
-        left_out.extend(go_on_evenly(&mut run.recording));
-        if !rate_gyroscope {
-            left_out.extend(without_frozen_rows(&mut run.recording));
-        }
-    }
-    if rate_gyroscope {
-        campaign.runs.iter_mut().for_each(|run| left_out.extend(without_jumps(run, period)));
-    } else if scattered.is_none() {
-        campaign.runs.iter().try_for_each(|run| require_degrees(run, period))?;
-    }
-    if let Some(periods) = scattered.filter(|periods| *periods > 1.0) {
-        left_out.push(format!(
-            "the rows stand in no order: of whole numbers of periods a turn {periods:.0} alone fits, and was taken; pole_pairs in campaign.toml states it"
-        ));
-    }
+    left_out.extend(mended(&mut campaign, rate_gyroscope, scattered, period)?);
     let mut runs = prepare(campaign, &mut left_out)?;
     runs = if rate_gyroscope {
         rate_runs::believed(runs, stated.unwrap_or(1.0), period, &mut left_out)?
@@ -129,21 +114,13 @@ pub(crate) fn identify(
         believed(runs, stated, period, &mut left_out)?
     };
     let (mut fitted, mut held) = apart(runs)?;
-    let mut thermal = None;
-    if !rate_gyroscope {
+    let thermal = if rate_gyroscope {
+        None
+    } else {
         require_a_turn([&fitted, &held], stated.unwrap_or(1.0), period)?;
-        match Thermal::told(&fitted, stated, period, reference_c) {
-            Told::Nothing => {}
-            Told::Open(why) => left_out.push(why),
-            Told::Slopes(told) => {
-                [&mut fitted, &mut held].into_iter().flatten().for_each(|run| *run = told.undone(run));
-                thermal = Some(told);
-            }
-        }
-        let drifts = Drifts::told(&fitted, stated, period);
-        [&mut fitted, &mut held].into_iter().flatten().for_each(|run| *run = drifts.undone(run));
-        left_out.extend(drifts.said());
-    }
+        let asked = Asked { stated, sense, period, rates_alone };
+        without_drifts([&mut fitted, &mut held], asked, reference_c, &mut left_out)
+    };
     let (left, needed) = (held.iter().map(SensorRun::len).sum::<usize>(), least_held_out(instrument));
     if left < needed {
         return Err(Refusal::no_answer(
@@ -177,6 +154,59 @@ pub(crate) fn identify(
     })?;
     cross_axis::add(&mut identified.report, across)?;
     Ok(identified)
+}
+
+/// What can be done about rows that were not recorded as they stand, and what is said of it; a sensor's angles are in degrees, where its rows
+/// can be followed.
+fn mended(
+    campaign: &mut Campaign,
+    rate_gyroscope: bool,
+    scattered: Option<f64>,
+    period: f64,
+) -> Result<Vec<String>, Refusal> {
+    let mut said = Vec::new();
+    for run in campaign.runs.iter_mut().filter(|run| run.kind == RunKind::Rotation) {
+        said.extend(go_on_evenly(&mut run.recording));
+        if !rate_gyroscope {
+            said.extend(without_frozen_rows(&mut run.recording));
+        }
+    }
+    if rate_gyroscope {
+        campaign.runs.iter_mut().for_each(|run| said.extend(without_jumps(run, period)));
+    } else if scattered.is_none() {
+        campaign.runs.iter().try_for_each(|run| require_degrees(run, period))?;
+    }
+    if let Some(periods) = scattered.filter(|periods| *periods > 1.0) {
+        said.push(format!(
+            "the rows stand in no order: of whole numbers of periods a turn {periods:.0} alone fits, and was taken; pole_pairs in campaign.toml states it"
+        ));
+    }
+    Ok(said)
+}
+
+/// Takes out of the runs what is none of the sensor's at one temperature: what follows the temperature, which is returned, and what goes with
+/// the time.
+fn without_drifts(
+    [fitted, held]: [&mut Vec<SensorRun>; 2],
+    Asked { stated, period, .. }: Asked,
+    reference_c: Option<f64>,
+    said: &mut Vec<String>,
+) -> Option<Thermal> {
+    let thermal = match Thermal::told(fitted, stated, period, reference_c) {
+        Told::Nothing => None,
+        Told::Open(why) => {
+            said.push(why);
+            None
+        }
+        Told::Slopes(told) => {
+            fitted.iter_mut().chain(held.iter_mut()).for_each(|run| *run = told.undone(run));
+            Some(told)
+        }
+    };
+    let drifts = Drifts::told(fitted, stated, period);
+    fitted.iter_mut().chain(held.iter_mut()).for_each(|run| *run = drifts.undone(run));
+    said.extend(drifts.said());
+    thermal
 }
 
 /// A rate that was summed drifts, which an angle sensor does not: it is a rate gyroscope's.

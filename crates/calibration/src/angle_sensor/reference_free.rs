@@ -83,16 +83,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
     let mut warnings = Vec::new();
     let runs = without_spikes(runs.collect::<Result<_, _>>()?, std::f64::consts::TAU, &mut warnings);
-    let runs = of_one_sensor(runs, &mut warnings)?;
-    let (mut fitted, mut held) = apart(runs.clone())?;
-    if runs.iter().all(|run| run.role == Role::Fit) && one_turn_only(&runs, &fitted) {
-        (fitted, held) = stretches_apart(&runs);
-        warnings.push(
-            "the channels go round once, and the last quarter of the rows is where no other rows are: every fourth of 24 stretches is \
-             held out instead; a recording that goes round twice is judged on its last quarter"
-                .into(),
-        );
-    }
+    let (fitted, held) = parts(of_one_sensor(runs, &mut warnings)?, &mut warnings)?;
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
         return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));
@@ -108,13 +99,8 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     }
     let deviations = deviations(&readout, &thinned);
     let plain = Readout { rails, ..Readout::plain() };
-    let (mut before, after) = (constancy(&plain, &held), constancy(&readout, &held));
+    let (before, after) = (constancy(&plain, &held), constancy(&readout, &held));
     let raw_turns = turns(&readout);
-    if !raw_turns {
-        // as a share of what turns, and not of how far off that is
-        let scale = mean_radius(&plain, &held) / (readout.amplitude * readout.radius);
-        before = Constancy { rms: before.rms * scale, peak: before.peak * scale };
-    }
     let neutral = readout.kind == Kind::Plain || (raw_turns && after.rms >= before.rms);
     let as_recorded =
         predicted_raw.map_or("as recorded the angle does not turn".into(), |rms| format!("{rms:.2e} as recorded"));
@@ -180,6 +166,20 @@ pub(crate) fn own_ratios(campaign: &Campaign) -> Vec<Option<f64>> {
 
 fn refuse(what: String, wanted: &str) -> Refusal {
     Refusal::no_answer("campaign", what, wanted)
+}
+
+/// The rows to fit and those held out: the last quarter where nothing else is stated, and stretches all around where that stands alone.
+fn parts(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
+    let (fitted, held) = apart(runs.clone())?;
+    if runs.iter().any(|run| run.role == Role::Holdout) || !one_turn_only(&runs, &fitted) {
+        return Ok((fitted, held));
+    }
+    warnings.push(
+        "the channels go round once, and the last quarter of the rows is where no other rows are: every fourth of 24 stretches is \
+         held out instead; a recording that goes round twice is judged on its last quarter"
+            .into(),
+    );
+    Ok(stretches_apart(&runs))
 }
 
 /// Whether the last quarter of the rows stands where the rows before it do not, in a turn that all of them go round.

@@ -1,6 +1,7 @@
 //! Instruments whose loops are closed, on a rate table: from the recordings to the report.
 
 mod errors;
+mod explained;
 mod identify;
 mod report;
 

@@ -63,7 +63,7 @@ pub(crate) fn require_of_the_calibrated(
         );
         Err(Refusal::new(&recording.source.display().to_string(), problem, unit.map_or(same, str::to_owned)))
     };
-    let [turns, goes_round] = [turns(rows, h), goes_round(rows, h.period_rad)];
+    let [turns, goes_round] = [turns(rows, h), goes_round(rows, h.period_rad, 1)];
     if turns {
         let (gain, is_another) = turned(rows, h);
         if is_another {
@@ -92,7 +92,7 @@ pub(crate) fn require_of_the_calibrated(
     }
     let channels = recording.xc_v.is_some() && recording.yc_v.is_some();
     if h.instrument == Instrument::Sensor && channels && goes_round {
-        let [before, after] = [0, 1].map(|i| 100.0 * radius_error(rows, i));
+        let [before, after] = [0, 1].map(|i| 100.0 * radius_error(rows, h.period_rad, i));
         let is_as_calibrated = || with_the_angle(&angles_and_radii(rows)) < as_calibrated(calibration);
         if after > WORSE * before && !is_as_calibrated() {
             let problem =
@@ -115,7 +115,7 @@ fn counted_the_other_way(h: &Hypothesis, recording: &Recording, rows: &[Row]) ->
 /// What is said of a recording without a reference whose angle counts the other way than the calibrated one: a table that stands
 /// the other way round leaves it less smooth than with its sign turned.
 pub(crate) fn counts_the_other_way(h: &Hypothesis, recording: &Recording, rows: &[Row]) -> Option<String> {
-    if recording.table_deg.is_some() || recording.rate_dps.is_some() || !goes_round(rows, h.period_rad) {
+    if recording.table_deg.is_some() || recording.rate_dps.is_some() || !goes_round(rows, h.period_rad, 1) {
         return None;
     }
     let turned = counted_the_other_way(h, recording, rows)?;
@@ -141,7 +141,7 @@ pub(crate) fn left_in_the_radius(calibration: &Calibration, rows: &[Row]) -> Opt
     let h = &calibration.hypothesis;
     let reads = |id: EffectId| matches!(id, EffectId::DetectionOffset | EffectId::DetectionGainMismatch);
     let corrected = h.members.iter().any(|m| reads(m.id));
-    if h.instrument != Instrument::Sensor || !corrected || !goes_round(rows, h.period_rad) {
+    if h.instrument != Instrument::Sensor || !corrected || !goes_round(rows, h.period_rad, 1) {
         return None;
     }
     let share = with_the_angle(&angles_and_radii(rows));
@@ -217,20 +217,24 @@ fn angle_error(rows: &[Row], gain: f64, period: f64, after: usize) -> f64 {
     robust_deviation(rows.iter().zip(&error).map(left))
 }
 
-/// Whether the compensated angle goes round, so that the radius is seen all around.
-fn goes_round(rows: &[Row], period: f64) -> bool {
+/// Whether the angle as recorded, or compensated, goes round, so that the radius is seen all around.
+fn goes_round(rows: &[Row], period: f64, after: usize) -> bool {
     const PARTS: usize = 12;
     let mut seen = [false; PARTS];
     for r in rows {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a turn")]
-        let part = (r.angle_rad[1].rem_euclid(period) / period * PARTS as f64) as usize;
+        let part = (r.angle_rad[after].rem_euclid(period) / period * PARTS as f64) as usize;
         seen[part.min(PARTS - 1)] = true;
     }
     rows.len() >= FEWEST_ROWS && seen.iter().all(|s| *s)
 }
 
-/// Robust deviation of the radius, as a share of it.
-fn radius_error(rows: &[Row], after: usize) -> f64 {
+/// Robust deviation of the radius, as a share of it; anything where the angle does not go round, for about an origin far off every radius is
+/// constant.
+fn radius_error(rows: &[Row], period: f64, after: usize) -> f64 {
+    if !goes_round(rows, period, after) {
+        return f64::INFINITY;
+    }
     let usual = median(&mut rows.iter().map(|r| r.radius[after]).collect::<Vec<_>>());
     robust_deviation(rows.iter().map(|r| r.radius[after] / usual - 1.0))
 }
