@@ -83,7 +83,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
     let mut warnings = Vec::new();
     let runs = without_spikes(runs.collect::<Result<_, _>>()?, std::f64::consts::TAU, &mut warnings);
-    let (fitted, held) = parts(of_one_sensor(runs, &mut warnings)?, &mut warnings)?;
+    let (fitted, held) = parts(&of_one_sensor(runs, &mut warnings)?, &mut warnings)?;
     let count = |runs: &[SensorRun]| runs.iter().map(SensorRun::len).sum::<usize>();
     if count(&fitted) < FEWEST_ROWS || count(&held) < FEWEST_HELD_ROWS {
         return Err(refuse("too few rows to fit a curve and to test it".into(), "a longer recording"));
@@ -169,9 +169,9 @@ fn refuse(what: String, wanted: &str) -> Refusal {
 }
 
 /// The rows to fit and those held out: the last quarter where nothing else is stated, and stretches all around where that stands alone.
-fn parts(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
-    let (fitted, held) = apart(runs.clone())?;
-    if runs.iter().any(|run| run.role == Role::Holdout) || !one_turn_only(&runs, &fitted) {
+fn parts(runs: &[SensorRun], warnings: &mut Vec<String>) -> Result<(Vec<SensorRun>, Vec<SensorRun>), Refusal> {
+    let (fitted, held) = apart(runs.to_vec())?;
+    if runs.iter().any(|run| run.role == Role::Holdout) || !one_turn_only(runs, &fitted) {
         return Ok((fitted, held));
     }
     warnings.push(
@@ -179,7 +179,7 @@ fn parts(runs: Vec<SensorRun>, warnings: &mut Vec<String>) -> Result<(Vec<Sensor
          held out instead; a recording that goes round twice is judged on its last quarter"
             .into(),
     );
-    Ok(stretches_apart(&runs))
+    Ok(stretches_apart(runs))
 }
 
 /// Whether the last quarter of the rows stands where the rows before it do not, in a turn that all of them go round.
