@@ -114,11 +114,11 @@ pub(crate) fn identify(
         believed(runs, stated, period, &mut left_out)?
     };
     let (mut fitted, mut held) = apart(runs)?;
+    let asked = Asked { stated, sense, period, rates_alone };
     let thermal = if rate_gyroscope {
         None
     } else {
         require_a_turn([&fitted, &held], stated.unwrap_or(1.0), period)?;
-        let asked = Asked { stated, sense, period, rates_alone };
         without_drifts([&mut fitted, &mut held], asked, reference_c, &mut left_out)
     };
     let (left, needed) = (held.iter().map(SensorRun::len).sum::<usize>(), least_held_out(instrument));
@@ -141,7 +141,6 @@ pub(crate) fn identify(
         let model;
         (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
         held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
-        let asked = Asked { stated, sense, period, rates_alone };
         sensor_finding(asked, model, thermal.as_ref(), [&fitted, &held], texts)?
     };
     finding.warnings.extend(left_out);
