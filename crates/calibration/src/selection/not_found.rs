@@ -89,10 +89,7 @@ impl Models {
             let deviation = size * amplitude.powi(-i32::from(d.scaling.amplitude));
             priors.push(Prior { unknown, mean: d.parameters[p].neutral, deviation, considered: false });
         }
-        // at one rate what is held, lest it be dragged along, is all that a cause could hide behind
-        let is_held =
-            |&i: &usize| Prior::considered_deviation(&priors, unknowns[i]).is_some() && dataset.tracks_differ();
-        let held = own.iter().map(is_held).collect();
+        let held = own.iter().map(|&i| Prior::considered_deviation(&priors, unknowns[i]).is_some()).collect();
         let fit = Fit { hypothesis: all, unknowns, ..fitted.fit.clone() };
         Some(Self { equations: linearised(&dataset.tracks, &fit, &priors)?, own, held, others })
     }
