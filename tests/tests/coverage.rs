@@ -21,6 +21,8 @@ const OTHER_TRIALS: u64 = 12;
 /// What a 95 % interval may hold in the long run.
 const LOWEST_COVERAGE: f64 = 0.92;
 const HIGHEST_COVERAGE: f64 = 0.98;
+/// What the intervals of all runs of a campaign hold together: each of them a little less than what they share.
+const LOWEST_OF_ALL_RUNS: f64 = 0.85;
 /// How rarely an interval of that coverage fails this test.
 const LEVEL: f64 = 1e-3;
 /// Half width of the angular gain's interval where a drift of 1e-3 rad/s may go unrecorded in each of several runs, the
@@ -58,6 +60,8 @@ struct Answer {
     estimates: [Option<Estimate>; 3],
     truth: [f64; 3],
     noise_v: f64,
+    /// whether the angular gain of each run holds the truth
+    runs_hold: bool,
     /// effects of the library that were discovered, and what was corrected without a cause
     claimed: Vec<String>,
     corrected: Vec<String>,
@@ -78,6 +82,7 @@ fn answer(seed: u64, coloured: Option<Coloured>, without: &[&str]) -> Answer {
         estimates: [r.detection_gain_ratio, r.actuation_gain_ratio, Some(r.angular_gain)],
         truth,
         noise_v,
+        runs_hold: r.runs.iter().filter_map(|run| run.angular_gain).all(|k| holds(&k, truth[2])),
         claimed,
         corrected,
         over_floor: over_floor(&identified),
@@ -141,6 +146,15 @@ fn failures(answers: &[Answer], parameters: &[usize], highest: f64, most_unanswe
             failures
                 .push(format!("{name}: {held} of {count} intervals hold the truth, expected {lowest} to {highest}"));
         }
+    }
+    // what one run tells beside what all tell: as sure as that and no surer
+    let held = answers.iter().filter(|a| a.runs_hold).count() as u64;
+    println!("  gains of all runs  {held:>4}  {:.3}", held as f64 / count as f64);
+    let lowest = binomial_quantile(count, LOWEST_OF_ALL_RUNS, LEVEL);
+    if held < lowest {
+        failures.push(format!(
+            "the gains of all runs: {held} of {count} campaigns hold the truth, expected {lowest} at least"
+        ));
     }
     for (seed, a) in answers.iter().enumerate() {
         for ((name, estimate), truth) in PARAMETERS.iter().zip(&a.estimates).zip(a.truth) {

@@ -7,8 +7,8 @@
 use cvg_calibration::report::Report;
 use cvg_calibration::{Identification, Origin};
 use cvg_model::effects::EffectId;
-use cvg_simulator::Settings;
 use cvg_simulator::scenario::{Purpose, Run};
+use cvg_simulator::{Scenario, Settings};
 use cvg_tests::bench::{
     Draws, all, deviations, effect, found, holds, identify, identify_folder, identify_without, over_floor, plain_paper,
     polar, scenario, trials,
@@ -213,4 +213,15 @@ fn a_level_of_the_drives_that_the_runs_refute_is_none() {
         (found(&i, Origin::Discovered).len(), over_floor(&i))
     });
     assert!(told.iter().all(|(found, over)| *found == 0 && *over < 1.5), "{told:?}");
+}
+
+/// One recording of two channels at one rate: what bends the angle there may be a slow push on the pattern as well as a cubic readout. The
+/// one was named, with an interval of 2 %, and bent the angle twice as much at the opposite rate.
+#[test]
+fn at_one_rate_what_no_cause_is_told_of_is_a_harmonic() {
+    let mut settings = Scenario::paper().settings().clone();
+    settings.runs.truncate(1);
+    let i = identify_without(settings, &["xs_v", "ys_v", "vas_v", "vqc_v"]).unwrap();
+    assert_eq!(found(&i, Origin::Empirical), ["harmonic-n"], "{:?}", i.report.effects);
+    assert!(found(&i, Origin::Discovered).is_empty(), "{:?}", i.report.effects);
 }

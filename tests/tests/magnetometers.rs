@@ -119,3 +119,24 @@ fn a_circle_in_whole_counts_has_no_rail() {
     let found = (0..40).filter(|seed| clipped(*seed)).count();
     assert!(found <= 1, "{found} of 40");
 }
+
+/// Without a reference nothing tells how often the angle goes round with what turns the sensor: "turns 4 times as far as its reference, that
+/// of the calibration once".
+#[test]
+fn what_is_calibrated_without_a_reference_undoes_a_recording_with_one() {
+    let degrees: Vec<f64> = (0..3 * ROWS).map(|i| f64::from(i) * 2.0).collect();
+    let [x, y] = channels(&degrees, [0.5, -0.3], 0.9, 0.001, 3);
+    let of_four_poles = degrees.iter().map(|d| d / 4.0).collect();
+    let campaign = sensor(vec![read_at(of_four_poles, x, y, Role::Fit)]);
+    let recording = campaign.runs[0].recording.clone();
+    let absent = Campaign { reference: Some(Reference::Absent), angular_gain: None, ..campaign };
+    let Ok(Answer::Surveyed(surveyed)) = answer(absent, &Options::default()) else { panic!("no survey") };
+    let calibration = surveyed.calibration.unwrap();
+    let text = calibration.to_text();
+    assert!(!text.contains("angular_gain"), "{text}");
+    let read = Calibration::from_text(&text, "calibration.toml").unwrap();
+    let theta = compensate(&read, &recording).unwrap().theta_deg.unwrap();
+    let off = |i: usize| (theta[i] - theta[0] - degrees[i] + 180.0).rem_euclid(360.0) - 180.0;
+    // the skew of the channels is told, where they lie within the turn is not
+    assert!((0..theta.len()).all(|i| off(i).abs() < 20.0), "{:?}", &theta[..4]);
+}

@@ -553,3 +553,37 @@ fn runs_that_hardly_turn_are_not_of_another_gyroscope() {
         assert!((i.report.angular_gain.value.abs() - 0.99).abs() < 0.01, "seed {seed}: {:?}", i.report.angular_gain);
     }
 }
+
+/// A minute in which nothing turns: the reference wanders by hundredths of a degree, the angle by its bias.
+fn resting(name: &str, role: Role, seed: u64) -> Run {
+    let mut noise = Noise::new(seed);
+    let t_s: Vec<f64> = (0..3000).map(|i| 0.02 * f64::from(i)).collect();
+    let mut wander = 0.0;
+    let mut wanders = || {
+        wander += 0.01 * (0.002 * noise.sample() - 0.02 * wander);
+        wander
+    };
+    let table: Vec<f64> = t_s.iter().map(|_| wanders()).collect();
+    let theta: Vec<f64> = t_s.iter().map(|t| 0.08 * t + 0.005 * noise.sample()).collect();
+    run(name, role, Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() })
+}
+
+/// What moves at rest is the noise of the reference, of which the angle has nothing: a scale factor near zero, sharply told. Such runs
+/// had the one that turned left out, or the campaign refused.
+#[test]
+fn runs_at_rest_tell_the_bias_and_nothing_of_the_scale_factor() {
+    for seed in 0..4 {
+        let runs = vec![
+            leaking_rate_gyroscope(500 + seed, 0.0),
+            resting("rest-0.csv", Role::Fit, 600 + seed),
+            resting("rest-1.csv", Role::Fit, 700 + seed),
+            resting("rest-2.csv", Role::Fit, 800 + seed),
+            resting("check.csv", Role::Holdout, 900 + seed),
+        ];
+        let i = identified(Campaign { instrument: Instrument::Gyroscope, ..sensor(runs) });
+        let k = i.report.angular_gain;
+        assert!(k.ci95[0] < 0.997 && 0.997 < k.ci95[1] && k.half_width() < 0.01, "seed {seed}: {k:?}");
+        assert!(i.report.runs[1..].iter().all(|r| r.angular_gain.is_none()), "seed {seed}: {:?}", i.report.runs);
+        assert!(held_out(&i) < 0.02, "seed {seed}: {:?}", i.report.heldout);
+    }
+}

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::{Campaign, Recording, Role, Run};
-use cvg_calibration::{Identification, compensate};
+use cvg_calibration::{Identification, Options, compensate, identify};
 use cvg_tests::angle_sensor::{Noise, find, held_out, identified, run, sensor};
 
 /// Two channels as they are built, V, and the shaft that they sit on.
@@ -299,5 +299,27 @@ fn a_run_in_few_directions_is_of_the_sensor_whose_ellipse_it_lies_on() {
         let runs = vec![along("round.csv", Role::Fit, round), along("few.csv", Role::Holdout, few)];
         let i = cvg_calibration::identify(sensor(runs), &cvg_calibration::Options::default());
         assert!(i.is_ok(), "seed {seed}: {}", i.err().map_or(String::new(), |refusal| refusal.to_string()));
+    }
+}
+
+/// A held-out run is judged after the best line through it, which makes nothing of a sensor that stands still in it: "0.0000°" was left of
+/// one that did.
+#[test]
+fn a_held_out_run_in_which_the_angle_does_not_follow_is_no_test() {
+    let campaign = |gains: &[f64]| {
+        let held = |(at, gain): (usize, &f64)| {
+            let recording = recorded(BUILT, 18.0, *gain, 10 + at as u64);
+            run(&format!("held-{at}.csv"), Role::Holdout, recording)
+        };
+        let mut runs = vec![run("fit.csv", Role::Fit, recorded(BUILT, 37.0, 1.0, 1))];
+        runs.extend(gains.iter().enumerate().map(held));
+        Campaign { angular_gain: Some(1.0), ..sensor(runs) }
+    };
+    for gain in [0.0, 0.5, 1.1, -1.0] {
+        let refusal = identify(campaign(&[gain]), &Options::default()).unwrap_err().to_string();
+        assert!(refusal.contains("held-0.csv: held out, its angle turns"), "{gain}: {refusal}");
+        let beside = identified(campaign(&[gain, 1.0]));
+        let said = beside.report.warnings.iter().any(|w| w.contains("held-0.csv: left out: its angle turns"));
+        assert!(said && held_out(&beside) < 0.03, "{gain}: {:?}, {:?}", beside.report.warnings, beside.report.heldout);
     }
 }

@@ -56,15 +56,29 @@ pub enum Status {
     Refused,
 }
 
+/// The largest ratio of the gains of two channels, of which each may be in a unit of its own, that leaves an angle: engineering choice.
+pub(crate) const LARGEST_RATIO_OF_A_SENSOR: f64 = 30.0;
+
 /// The share of what the declared model leaves that follows one thing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Share {
-    /// pattern, table, time, rate, amplitude, direction, temperature or rest; joined by " or " where the rows do not tell them apart
+    /// pattern, table, time, rate, amplitude, direction, temperature or rest
     pub of: String,
+    /// what the rows do not tell it apart from: one share for all of them
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shared_with: Vec<String>,
     /// share of the variance, 0 to 1
     pub share: f64,
     /// its 95 % interval
     pub ci95: [f64; 2],
+}
+
+impl Share {
+    /// All that has the share, as "pattern or time".
+    #[must_use]
+    pub fn named(&self) -> String {
+        [std::slice::from_ref(&self.of), &self.shared_with].concat().join(" or ")
+    }
 }
 
 /// The program that wrote a report.
@@ -425,7 +439,7 @@ pub struct DecayReport {
     pub damping_per_s: Estimate,
     /// τ, s
     pub tau_s: Estimate,
-    /// precession of the pattern by the input rotation, θ̇ = −kΩ, at the mean rate of the runs, deg/h
+    /// precession of the pattern by the input rotation, θ̇ = −kΩ, at the rate of the runs, deg/h; not told where that is not one
     pub precession_dph: Estimate,
     /// the same under the paper's model alone
     pub precession_dph_declared: Estimate,

@@ -3,12 +3,13 @@
 
 use crate::angle_sensor;
 use crate::carrier;
+use crate::data::channel_ranges::require_one_unit;
 use crate::data::copies::without_copies;
 use crate::error::Refusal;
 use crate::free_decay;
 use crate::identified::{Identification, Options, not_tried};
 use crate::rate_table;
-use crate::recording::{Campaign, Reference, RunKind};
+use crate::recording::{Campaign, Instrument, Reference, RunKind};
 use crate::report::RunReport;
 use crate::report::recorded::run_report;
 
@@ -29,7 +30,7 @@ pub fn identify_with_plots(campaign: Campaign, options: &Options<'_>) -> Result<
 }
 
 fn run(mut campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
-    let mut warnings = Vec::new();
+    let mut warnings = std::mem::take(&mut campaign.warnings);
     let copies = without_copies(&mut campaign, &mut warnings);
     let mut identified = without_doubles(campaign, options, with_plots)?;
     identified.report.warnings.extend(warnings);
@@ -57,6 +58,7 @@ fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) 
 /// An instrument whose loops are closed, or that has none.
 fn looped(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
     require_a_reference(&campaign)?;
+    require_one_unit(&campaign)?;
     if angle_sensor::serves(&campaign) {
         return angle_sensor::identify(campaign, options, with_plots);
     }
@@ -80,6 +82,10 @@ fn require_a_reference(campaign: &Campaign) -> Result<(), Refusal> {
             "runs with theta_deg alone, kind = \"rotation\" about the input axis among them, and period_deg = 360.0";
         let what = "a run across the input axis is one of a rate gyroscope";
         return Err(Refusal::new(&run.file.display().to_string(), what, wanted));
+    }
+    if campaign.pole_pairs.is_some() && campaign.instrument != Instrument::Sensor {
+        let wanted = "instrument = \"sensor\" in [campaign], or no pole_pairs";
+        return Err(Refusal::new("campaign", "pole_pairs is of an angle sensor, and this is a gyroscope", wanted));
     }
     if campaign.reference == Some(Reference::Absent) {
         let wanted = "rate_dps or table_deg, or instrument = \"sensor\"";

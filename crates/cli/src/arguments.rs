@@ -67,7 +67,8 @@ const FIRMWARE: &str = "\
 Examples:
   cvg firmware results/calibration.toml --out cvg_correction.h      float cvg_compensate(float x, float y)
   cvg firmware results/calibration.toml --out correction.rs         of an angle: pub fn cvg_compensate(theta_deg: f32, …) -> f32
-  cvg firmware results/calibration.toml --out table.csv --points 64";
+  cvg firmware results/calibration.toml --out table.csv --points 64
+  cvg firmware gyroscope/calibration.toml --out cvg_device.h        void cvg_device_undo(cvg_settings *)";
 
 const EFFECTS: &str = "\
 Examples:

@@ -191,6 +191,7 @@ fn refuse(refused: &Refused, out: Option<&Path>, inputs: &[PathBuf], json: bool)
         let mut set = output::Set::begin(out, inputs)?;
         set.add(report, text.as_bytes())?;
         set.take_away(&stale);
+        set.take_away(&proposal_names().iter().map(String::as_str).collect::<Vec<_>>());
         set.commit()?;
         output::tell(format_args!("wrote {}", out.join("report.json").display()));
     }

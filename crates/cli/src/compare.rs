@@ -136,7 +136,8 @@ fn parameter(name: String, unit: &str, value: &Value) -> Option<Parameter> {
 fn of_calibration(calibration: &Calibration) -> Vec<Parameter> {
     let h = &calibration.hypothesis;
     let bare = |name: String, unit: &str, value: f64| Parameter { name, unit: unit.to_owned(), value, ci95: None };
-    let mut out = vec![bare("angular_gain".into(), "1", h.angular_gain)];
+    let gain = (!calibration.provenance.gain_unknown).then(|| bare("angular_gain".into(), "1", h.angular_gain));
+    let mut out: Vec<Parameter> = gain.into_iter().collect();
     for m in &h.members {
         let parameters = m.id.description().parameters.iter().zip(m.values);
         out.extend(parameters.map(|(p, v)| bare(format!("{}.{}", m.id, p.name), p.unit, v)));

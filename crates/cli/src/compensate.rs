@@ -16,6 +16,9 @@ pub(crate) fn compensate(
     naming: &Naming,
 ) -> Result<(), Failure> {
     let files = input::files(recordings)?;
+    // the results of an identification are in a folder
+    let in_results = calibration_file.join("calibration.toml");
+    let calibration_file = if calibration_file.is_dir() { in_results.as_path() } else { calibration_file };
     let mut inputs = vec![calibration_file.to_owned()];
     inputs.extend(files.iter().cloned());
     let targets = targets(&files, out)?;
@@ -23,6 +26,10 @@ pub(crate) fn compensate(
         output::check_file(target, &inputs)?;
     }
     let calibration = Calibration::read(calibration_file)?;
+    if let Some(campaign) = files.iter().find(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))) {
+        let what = "is a campaign; wanted its recordings, one after the other, with what its [columns] say by --map";
+        return Err(Failure::input(format!("{}: {what}", campaign.display())));
+    }
     if let Some(device) = device.filter(|d| *d != calibration.device) {
         return Err(Failure::input(format!(
             "--device {device}: {} is the calibration of {}",

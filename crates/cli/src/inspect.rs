@@ -146,7 +146,7 @@ fn timing(t: &[f64]) -> (f64, f64, f64) {
 }
 
 /// What a recording serves for, or what it lacks.
-fn uses(recording: &Recording) -> Vec<String> {
+fn uses(recording: &Recording, kind: Option<RunKind>) -> Vec<String> {
     let say = |kind: &str, asked: Result<(), ReadError>| match asked {
         Ok(()) => format!("serves as {kind}"),
         Err(ReadError::MissingColumns { needed, .. }) => format!("does not serve as {kind}: it needs {needed}"),
@@ -158,13 +158,19 @@ fn uses(recording: &Recording) -> Vec<String> {
         say("a rotation", recording.require_rotation())
     };
     let mut out = vec![rotation];
+    if kind == Some(RunKind::Static) {
+        return vec!["serves at rest".to_owned()];
+    }
     if recording.require_rotation().is_err() {
         if recording.xc_v.is_some() && recording.yc_v.is_some() {
             out.push("serves as a sensor without a reference (--sensor)".to_owned());
         }
         out.push(say("a free decay", recording.require_decay()));
     }
-    out.push(say("a ring-down", recording.require_ringdown()));
+    let turns = recording.require_rotation().is_ok() && !input::stands_still(recording);
+    if !turns {
+        out.push(say("a ring-down", recording.require_ringdown()));
+    }
     if recording.vas_v.is_none() || recording.vqc_v.is_none() {
         out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
     }
@@ -178,7 +184,7 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
     };
     let d = &recording.dropped;
     let (duration, interval, largest) = timing(&recording.t_s);
-    let kind = kind.map_or("", |k| match k {
+    let stated = kind.map_or("", |k| match k {
         RunKind::Rotation => ", a rotation",
         RunKind::Ringdown { .. } => ", a ring-down",
         RunKind::CrossAxis => ", turned across the input axis",
@@ -186,22 +192,24 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
         RunKind::Decay => ", a free decay",
         RunKind::Virtual => ", virtual precession",
     });
-    line(format!("{}{kind}", recording.source.display()));
-    line(format!(
-        "  {} rows over {duration:.3} s, one every {:.6} s ({:.2} Hz), largest gap {largest:.6} s; {} rows dropped",
-        recording.len(),
-        interval,
-        1.0 / interval,
-        d.rows_dropped()
-    ));
+    line(format!("{}{stated}", recording.source.display()));
+    let dropped = d.rows_dropped();
+    line(match recording.len() {
+        rows @ 0..2 => format!("  {rows} rows, of which nothing can be told; {dropped} rows dropped"),
+        rows => format!(
+            "  {rows} rows over {duration:.3} s, one every {interval:.6} s ({:.2} Hz), largest gap {largest:.6} s; {dropped} rows \
+             dropped",
+            1.0 / interval
+        ),
+    });
     table(&mut s, &summaries(recording));
     let mut line = |text: String| {
         let _ = writeln!(s, "{text}");
     };
-    for u in uses(recording) {
+    for u in uses(recording, kind) {
         line(format!("  {u}"));
     }
-    if recording.warnings.is_empty() {
+    if recording.warnings.is_empty() && recording.len() > 1 {
         line("  nothing is wrong with it".into());
     }
     for w in &recording.warnings {
@@ -228,6 +236,10 @@ pub(crate) fn as_value(recording: &Recording) -> Value {
 
 /// The columns over time, a panel each, over one axis of time. A column that never changes has a panel too.
 fn draw(recording: &Recording, path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    let is = |name: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
+    if !(is("svg") || is("png")) {
+        return Err(Failure::input(format!("--plot {}: wanted a name that ends in .svg or .png", path.display())));
+    }
     let shown: Vec<Summary> = summaries(recording).into_iter().filter(|x| x.high >= x.low).collect();
     let stride = recording.len().div_ceil(POINTS).max(1);
     let names: Vec<String> = shown.iter().map(named).collect();
@@ -241,7 +253,7 @@ fn draw(recording: &Recording, path: &Path, inputs: &[PathBuf]) -> Result<(), Fa
             Series { name, colour, points: points.filter(|(_, v)| v.is_finite()).collect(), joined: true }
         })
         .collect();
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+    if is("png") {
         output::write_with(path, inputs, |part| panels_png(part, "time [s]", &series))?;
     } else {
         output::write(path, panels("time [s]", &series)?.as_bytes(), inputs)?;

@@ -1,7 +1,7 @@
 //! `--limits`: pass or fail on any number of the report.
 //!
 //! A number is named by its place in report.json, keys joined by dots. An element of a list is named by its number from 0,
-//! or by its `id`, `name`, `file`, `of` or `channel`: `effects.detection-cubic.parameters.kappa.value`, `effects[0].id`.
+//! or by its `id`, `name`, `file`, `of` or `channel`: `effects.detection-cubic.parameters.kappa.value`, `unexplained[0].rms_deg`.
 
 use std::path::Path;
 
@@ -14,8 +14,10 @@ use crate::{Failure, output, report_keys};
 
 /// What an element of a list is called by.
 const NAMES: [&str; 5] = ["id", "name", "file", "of", "channel"];
-/// What a limit says of a device that does not show the effect.
+/// What a limit says of a device that does not show the effect, or of what else a report need not have.
 const NOT_FOUND: &str = "not_found";
+/// What every report has, if only as what is not identifiable.
+const ALWAYS: [&str; 5] = ["actuation_gain_ratio", "angular_gain", "detection_gain_ratio", "heldout", "residual"];
 const WANTED: &str =
     "a number of report.json with min, max or both, as in \"heldout.discovered.rms_deg\" = { max = 0.01 }";
 
@@ -29,17 +31,17 @@ struct Limit {
     path: String,
     min: Option<f64>,
     max: Option<f64>,
-    /// a device that does not show the effect passes
+    /// a device whose report lacks it passes
     unless_found: bool,
 }
 
 /// What stands at a place of a report.
 enum Found {
     Number(f64),
+    /// a number that the data do not allow
     Null,
-    /// a parameter of an effect that the device does not show
-    NoEffect,
-    Nothing,
+    /// an element of a list, or a section, that this report lacks
+    Absent,
 }
 
 impl Limits {
@@ -68,7 +70,11 @@ impl Limits {
         for (key, value) in table {
             let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
             let Some(inner) = value.as_table() else { return Err(format!("`{path}` is no table")) };
-            let ends = inner.iter().all(|(k, v)| ["min", "max", NOT_FOUND].contains(&k.as_str()) && !v.is_table());
+            let is_end = |k: &str| ["min", "max", NOT_FOUND].contains(&k);
+            let ends = inner.iter().all(|(k, v)| is_end(k) && !v.is_table());
+            if let Some((unknown, _)) = inner.iter().find(|(k, v)| !is_end(k) && !v.is_table()) {
+                return Err(format!("`{path}`: there is no `{unknown}`, but min, max and {NOT_FOUND}"));
+            }
             if !ends {
                 self.add(inner, &path)?;
                 continue;
@@ -88,8 +94,8 @@ impl Limits {
                 Some(Some("pass")) => true,
                 Some(_) => return Err(format!("`{path}`: `{NOT_FOUND}` is not \"pass\"")),
             };
-            if unless_found && !path.starts_with("effects.") {
-                return Err(format!("`{path}` is of no effect, and `{NOT_FOUND}` is for those"));
+            if unless_found && ALWAYS.iter().any(|section| path.split(['.', '[']).next() == Some(section)) {
+                return Err(format!("`{path}` is in every report, and `{NOT_FOUND}` is for what may be absent"));
             }
             if min.is_none() && max.is_none() {
                 return Err(format!("`{path}` has neither min nor max"));
@@ -132,8 +138,13 @@ impl Limits {
             let (passes, value, shown) = match found {
                 Found::Number(value) => (limit.holds(value), Some(value), value.to_string()),
                 Found::Null => (false, None, "not identifiable".into()),
-                Found::NoEffect => (unless_found, None, "not found".into()),
-                Found::Nothing => return Err(unnamed(&path, &[])),
+                // a run that is not there is misspelt
+                Found::Absent if path.starts_with("runs.") && !unless_found => return Err(unnamed(&path, &[])),
+                // the names of effects that a user wrote were held against their files
+                Found::Absent if path.starts_with("effects.") || report_keys::is_known(&dotted(&path), &[]) => {
+                    (unless_found, None, "not found".into())
+                }
+                Found::Absent => return Err(unnamed(&path, &[])),
             };
             Ok(Verdict { path, value, shown, min, max, passes })
         };
@@ -219,30 +230,20 @@ pub(crate) fn outside(device: &str, verdicts: &[Verdict]) -> Option<String> {
 fn find(value: &Value, path: &str) -> Found {
     if path.is_empty() {
         return match value {
-            Value::Number(n) => n.as_f64().map_or(Found::Nothing, Found::Number),
+            Value::Number(n) => n.as_f64().map_or(Found::Absent, Found::Number),
             Value::Null => Found::Null,
-            _ => Found::Nothing,
+            _ => Found::Absent,
         };
-    }
-    if value.is_null() {
-        return Found::Null;
     }
     for end in path.match_indices('.').map(|(at, _)| at).chain([path.len()]) {
         let (key, rest) = (&path[..end], path[end..].trim_start_matches('.'));
         let Some(next) = step(value, key) else { continue };
         match find(next, rest) {
-            Found::Nothing => {}
+            Found::Absent => {}
             found => return found,
         }
     }
-    // an effect of the library that this instrument does not show
-    let effects = |v: &Value| v.as_array().is_some_and(|v| v.iter().all(|e| e.get("evidence").is_some()));
-    let id = path.split('.').next().unwrap_or_default();
-    if effects(value) && EffectId::from_id(id).is_some() && step(value, id).is_none() {
-        Found::NoEffect
-    } else {
-        Found::Nothing
-    }
+    Found::Absent
 }
 
 fn step<'v>(value: &'v Value, key: &str) -> Option<&'v Value> {

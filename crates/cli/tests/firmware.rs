@@ -108,17 +108,6 @@ fn the_table_of_the_angle_holds_at_the_calibrated_amplitude() {
     assert!(off < 0.02, "{off}");
 }
 
-#[test]
-fn a_gyroscope_is_sent_to_the_electronics_that_take_its_four_components() {
-    let bench = Bench::small();
-    let (campaign, out) = (bench.campaign(), bench.path("results"));
-    cvg_ok(&["identify".as_ref(), campaign.as_os_str(), "--out".as_ref(), out.as_os_str()]);
-    let (calibration, header) = (out.join("calibration.toml"), bench.path("c.h"));
-    let refused = cvg(&["firmware".as_ref(), calibration.as_os_str(), OsStr::new("--out"), header.as_os_str()]);
-    assert_eq!(refused.status, 2);
-    assert!(refused.stderr.contains("cvg.h") && !header.exists(), "{}", refused.stderr);
-}
-
 /// An encoder's position word against a table, with an error of `size` degrees four times a turn and an overtone of it: in the true
 /// angle, or in the one that it says.
 fn position_word(rows: u32, first: f64, size: f64, of_its_own: bool) -> String {
@@ -310,4 +299,44 @@ fn a_header_with_the_rails_of_one_channel_compiles_without_a_warning() {
         .output()
         .unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+}
+
+#[test]
+fn a_gyroscope_becomes_settings_of_its_electronics() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    cvg_ok(&["demo".as_ref(), "--out".as_ref(), at("demo").as_os_str()]);
+    let calibration = at("demo").join("calibration.toml");
+    let written = |name: &str| {
+        let out = at(name);
+        cvg_ok(&["firmware".as_ref(), calibration.as_os_str(), "--out".as_ref(), out.as_os_str()]);
+        fs::read_to_string(out).unwrap()
+    };
+    let module = written("device.rs");
+    for effect in [
+        "(EffectId::DetectionGainMismatch, [1.013",
+        "(EffectId::DetectionCubic, [",
+        "(EffectId::ActuationGainMismatch, [1.0",
+    ] {
+        assert!(module.contains(effect), "{effect}: {module}");
+    }
+    let header = written("cvg_device.h");
+    assert!(header.contains("{\"detection-gain-mismatch\", {1.013") && header.contains("Not in it"), "{header}");
+    let table = cvg(&["firmware".as_ref(), calibration.as_os_str(), OsStr::new("--out"), at("table.csv").as_os_str()]);
+    assert!(table.status == 2 && table.stderr.contains(".h or .rs"), "{}", table.stderr);
+    if Command::new("cc").arg("--version").output().is_err() {
+        println!("skipped: there is no cc");
+        return;
+    }
+    let main = "#include \"cvg_device.h\"\nint main(void) { cvg_settings s; cvg_device_undo(&s); return (int)s.readout_count; }\n";
+    fs::write(at("main.c"), main).unwrap();
+    let include = concat!("-I", env!("CARGO_MANIFEST_DIR"), "/../capi/include");
+    let built = Command::new("cc")
+        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", include, "main.c", "-o", "main"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    // as many as the calibration has of the readout
+    assert_eq!(Command::new(at("main")).status().unwrap().code(), Some(2));
 }

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-/// Numbers on the page and printed: alike to this share, and what stands behind ± to that.
+/// Numbers on the page and printed: alike to this share, what stands before ± within what is printed behind it, and that to that share.
 const SAME: f64 = 0.01;
 const SAME_WIDTH: f64 = 0.2;
 
@@ -53,6 +53,12 @@ fn number(word: &str) -> Option<f64> {
     word.trim_matches(|c: char| !c.is_ascii_digit() && !"+-.e".contains(c)).parse().ok()
 }
 
+/// What one in the last place of a number is worth.
+fn last_place(word: &str) -> f64 {
+    let decimals = word.split_once('.').map_or(0, |(_, d)| d.chars().take_while(char::is_ascii_digit).count());
+    0.1f64.powi(i32::try_from(decimals).unwrap())
+}
+
 /// Whether a printed line says what the page says, whose line may end in `…`.
 fn says(printed: &str, written: &str) -> bool {
     let (words, mut wanted): (Vec<_>, Vec<_>) =
@@ -65,10 +71,14 @@ fn says(printed: &str, written: &str) -> bool {
     }
     let mut width = SAME;
     words.len() >= wanted.len()
-        && words.iter().zip(&wanted).all(|(a, b)| {
+        && words.iter().zip(&wanted).enumerate().all(|(i, (a, b))| {
             let same = std::mem::replace(&mut width, if *b == "±" { SAME_WIDTH } else { SAME });
+            let half_width = words.get(i + 2).filter(|_| words.get(i + 1) == Some(&"±")).and_then(|w| number(w));
             match (number(a), number(b)) {
-                (Some(x), Some(y)) => (x - y).abs() <= same * y.abs(),
+                (Some(x), Some(y)) => {
+                    let off = (x - y).abs();
+                    off <= same * y.abs() && half_width.is_none_or(|half| off <= half.max(0.5 * last_place(b)))
+                }
                 _ => a == b,
             }
         })

@@ -44,8 +44,10 @@ fn limits_are_judged_a_line_each_and_one_that_fails_is_told_by_the_exit_code() {
     assert!(failed.stderr.contains("FAIL  small  angular_gain.value = 0.7"), "{}", failed.stderr);
     assert!(failed.stderr.contains("pass  small  detection_gain_ratio.value"), "{}", failed.stderr);
     let null = judged("\"allan.bias_instability_dph.value\" = { max = 1.0 }\n");
-    assert_eq!(null.status, 1, "what is not identifiable does not pass");
-    assert!(null.stderr.contains("not identifiable"), "{}", null.stderr);
+    assert_eq!(null.status, 1, "what the report lacks does not pass");
+    assert!(null.stderr.contains("= not found"), "{}", null.stderr);
+    let null = judged("\"allan.bias_instability_dph.value\" = { max = 1.0, not_found = \"pass\" }\n");
+    assert_eq!(null.status, 0, "{}", null.stderr);
     // an effect that the device does not show
     let of_cubic =
         |more: &str| judged(&format!("\"effects.detection-cubic.parameters.kappa.value\" = {{ max = 0.01{more} }}\n"));
@@ -111,8 +113,9 @@ fn limits_that_cannot_be_meant_are_refused_before_anything_is_identified() {
         ("\"angular_gain.value\" = 0.78\n", "is no table"),
         ("\"angular_gain.value\" = { max = \"1\" }\n", "`max` is no number"),
         ("\"angular_gain.value\" = {}\n", "neither min nor max"),
-        ("\"angular_gain.value\" = { max = 1, not_found = \"pass\" }\n", "is of no effect"),
+        ("\"angular_gain.value\" = { max = 1, not_found = \"pass\" }\n", "is in every report"),
         ("\"effects.detection-cubic.parameters.kappa.value\" = { max = 1, not_found = 1 }\n", "is not \"pass\""),
+        ("\"angular_gain.value\" = { mni = 1 }\n", "there is no `mni`"),
         ("", "there is no limit"),
         ("=\n", "limits.toml"),
     ] {

@@ -110,3 +110,22 @@ fn an_angle_without_an_error_leaves_nothing_to_correct() {
         assert_eq!(figure["layout"][axis]["range"], serde_json::json!([-1e-6, 1e-6]), "{id}");
     }
 }
+
+/// No gain makes one channel span a thousand times as much as the other: 28° were left of it with exit code 0.
+#[test]
+fn millivolts_beside_volts_are_named_with_the_factor() {
+    let folder = TempDir::new().unwrap();
+    let mut text = String::from("t_s,table_deg,xc_v,yc_v\n");
+    for i in 0..3000 {
+        let (t, table) = (0.01 * f64::from(i), 0.5 * f64::from(i));
+        let (sin, cos) = table.to_radians().sin_cos();
+        let _ = writeln!(text, "{t:.2},{table:.4},{:.3},{:.6}", 1000.0 * cos + 10.0 * sin, 1.02 * sin);
+    }
+    let file = folder.path().join("millivolts.csv");
+    fs::write(&file, text).unwrap();
+    let refused = identified(&file, &[]);
+    let named = refused.stderr.contains("xc_v spans") && refused.stderr.contains("--map 'xc_v=xc_v/1000'");
+    assert!((refused.status, named) == (1, true), "{}", refused.stderr);
+    let mapped = identified(&file, &[OsStr::new("--map"), OsStr::new("xc_v=xc_v/1000")]);
+    assert_eq!(mapped.status, 0, "{}", mapped.stderr);
+}

@@ -70,6 +70,8 @@ fn convert(
     let is_readout = |channel| matches!(channel, Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys);
     let of_readout: Vec<&str> = table.units.iter().filter(|(c, _)| is_readout(*c)).map(|(_, u)| u.as_str()).collect();
     let is_one = of_readout.windows(2).all(|pair| pair[0] == pair[1]);
+    let readouts = table.numbers.iter().map(|column| column.channel).filter(|channel| is_readout(*channel));
+    let in_brackets: Vec<Option<&str>> = readouts.map(|channel| naming.unknown_unit(channel)).collect();
     for column in &mut table.numbers {
         let channel = column.channel;
         let own = table.units.iter().find(|(other, _)| *other == channel).map(|(_, unit)| unit.as_str());
@@ -97,6 +99,15 @@ fn convert(
                     return Err(ReadError::Unit { path, channel, unit, wanted, column });
                 }
             }
+        } else if let Some(unit) = naming.unknown_unit(channel) {
+            if !is_readout(channel) {
+                let taken = units::of_channel(naming.wanted(channel));
+                warnings.push(format!("`{channel}`: {unit} is no unit that is known; it is taken for {taken}"));
+            } else if !units::is_count(unit) && in_brackets.windows(2).all(|pair| pair[0] == pair[1]) {
+                warnings.push(format!("`{channel}` is in {unit} and kept in it"));
+                kept = Some(unit.to_owned());
+            }
+            Conversion::NONE
         } else {
             naming.unit(channel).map_or(Conversion::NONE, |(_, by)| by)
         };

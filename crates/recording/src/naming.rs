@@ -136,6 +136,12 @@ impl Naming {
         if self.is_integral(channel) { Channel::Rate } else { channel }
     }
 
+    /// What stands in brackets at the end of a mapped name and is no unit that is known.
+    pub(super) fn unknown_unit(&self, channel: Channel) -> Option<&str> {
+        let unit = units::in_brackets(self.column(channel)?)?;
+        units::conversion(self.wanted(channel), unit).is_none().then_some(unit)
+    }
+
     /// The unit that a mapped name ends with, and what takes it to the channel's; `None` where there is none that is known.
     pub(super) fn unit(&self, channel: Channel) -> Option<(&str, Conversion)> {
         let unit = units::in_brackets(self.column(channel)?)?;

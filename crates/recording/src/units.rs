@@ -96,6 +96,11 @@ pub(crate) fn in_brackets(name: &str) -> Option<&str> {
     (!unit.is_empty()).then_some(unit)
 }
 
+/// Whether a unit says the counts of a converter, which what is recorded tells by itself.
+pub(crate) fn is_count(unit: &str) -> bool {
+    ["adu", "count", "counts", "cts", "dn", "lsb", "raw"].iter().any(|name| unit.eq_ignore_ascii_case(name))
+}
+
 /// A unit without the brackets around it.
 pub(crate) fn bare(unit: &str) -> &str {
     unit.trim().trim_matches(['(', ')', '[', ']', '<', '>']).trim()

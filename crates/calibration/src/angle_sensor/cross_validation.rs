@@ -37,7 +37,7 @@ const FAR_ROUNDER: f64 = 0.25;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Tolerance {
     /// half of the usual one, an engineering choice for interleaved blocks: those of a few dozen stations are single rows,
-    /// their standard error is wide, and a whole one leaves more error than is needed
+    /// their standard error is wide, and a whole one leaves more error than is needed; and for readouts without a table
     Half,
     /// one (Breiman et al. 1984)
     One,
@@ -355,6 +355,13 @@ pub(crate) fn choose<M: Ord>(candidates: &[Candidate<M>], tolerance: Tolerance) 
         .copied()
         .filter(|c| c.of_radius.as_ref().zip(roundest).is_none_or(|(r, best)| r.is_as_good_as(best, tolerance)))
         .min_by(|a, b| a.size.cmp(&b.size).then(a.texts.cmp(&b.texts)).then_with(|| by_loss(a, b)))
+}
+
+/// Of readouts alone, where the `simpler` one has no table, the simplest within half a standard error, where it predicts better: fifths of
+/// a few periods have a wide standard error, and a readout, unlike a table, has no room for what is not there.
+pub(crate) fn finer<M: Ord + Clone>(readouts: &[Candidate<M>], simpler: &Candidate<M>) -> Option<Candidate<M>> {
+    let finer = choose(readouts, Tolerance::Half).cloned();
+    finer.filter(|finer| finer.size >= simpler.size && finer.losses.total() < simpler.losses.total())
 }
 
 /// The candidate that predicts the angle best; one that leaves far less of the radius may be a hair worse.

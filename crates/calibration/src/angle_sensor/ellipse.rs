@@ -5,8 +5,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::readout::Readout;
 use super::samples::SensorRun;
+use crate::facts::LARGEST_RATIO_OF_A_SENSOR;
 use crate::numerics::linear::NormalEquations;
-use crate::report::calibration::LARGEST_RATIO_OF_A_SENSOR;
 
 /// The algebraic ellipse through the points of all runs: a x² + b xy + c y² + d x + e y = 1 by least squares.
 pub(crate) fn algebraic(runs: &[SensorRun]) -> Option<Readout> {

@@ -8,7 +8,7 @@ use super::drift::Drifts;
 use super::effects::{Described, LibraryReadout};
 use super::jumps::without_jumps;
 use super::model::{Outcome, SensorModel, positions};
-use super::odd_runs::without_odd_runs;
+use super::odd_runs::{held_out_as_fitted, without_odd_runs};
 use super::pattern_or_rate::Rate;
 use super::rate_finding::{Stated, rate_finding};
 use super::rate_runs;
@@ -141,6 +141,7 @@ pub(crate) fn identify(
         let model;
         (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
         held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
+        held = held_out_as_fitted(held, &fitted, &model, period, &mut left_out)?;
         sensor_finding(asked, model, thermal.as_ref(), [&fitted, &held], texts)?
     };
     finding.warnings.extend(left_out);
@@ -233,7 +234,7 @@ fn require_a_turn(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result<()
     let furthest = runs.iter().map(|run| travel_of_the_whole(parts, run) * gain.abs()).fold(0.0, f64::max);
     if furthest < HALF_A_TURN {
         let name = runs.first().map_or("campaign", |r| r.name.as_str());
-        return Err(Refusal::new(
+        return Err(Refusal::no_answer(
             name,
             format!("the angle turns through {:.1}° only", furthest.to_degrees()),
             match other_unit(runs, period).or_else(|| runs.iter().find_map(of_the_reference)) {
@@ -397,23 +398,15 @@ fn sensor_finding(
     let all = described.gain_ratio();
     let all = all.map(|all| covering(all, "detection gain ratio", own, CONTRADICTS, &mut warnings));
     let (there, not_told) = model.where_asked(runs, held);
-    warnings.extend(not_told.into_iter().map(|[n, other]| {
-        format!(
-            "the line of {n} per turn may as well be one of {other}, which looks the same at the stations that were fitted, and is \
-             another at those held out: it is not taken off there"
-        )
-    }));
+    warnings.extend(not_told.into_iter().map(of_two_lines));
     // a negative one that counts with the reference is k as Equation 1 has it
     let against = sense.is_some_and(|s| s > 0.0 && model.sensor.gain < 0.0);
     let gain_ratio = all.map(|ratio| if against { or_exchanged(ratio) } else { ratio });
-    if against {
-        warnings.push(counts_against(gain_ratio));
-    }
+    warnings.extend(against.then(|| counts_against(gain_ratio)));
     let on_a_circle =
         model.front().filter(|r| r.kind == Kind::Plain).and_then(|_| circle::said_of(&model.sensor, runs));
-    if gain_ratio.is_none() && !neutral && on_a_circle.is_none() {
-        warnings.push("detection_gain_ratio is null: no gain and skew were needed to predict the angle".into());
-    }
+    let without_ratio = gain_ratio.is_none() && !neutral && on_a_circle.is_none();
+    warnings.extend(without_ratio.then(|| NO_GAIN_RATIO.to_owned()));
     warnings.extend(on_a_circle);
     let thermal = thermal.filter(|_| !neutral);
     warnings.extend(thermal.and_then(Thermal::said));
@@ -498,6 +491,17 @@ fn with_the_interval(mut effects: Vec<EffectReport>, ratio: Option<Estimate>) ->
     let parameters = effects.iter_mut().filter(|e| e.id == id).flat_map(|e| &mut e.parameters);
     parameters.for_each(|p| p.ci95 = ratio.map(|r| r.ci95).or(p.ci95));
     effects
+}
+
+/// Where a readout without gain and skew predicts as well.
+const NO_GAIN_RATIO: &str = "detection_gain_ratio is null: no gain and skew were needed to predict the angle";
+
+/// Says that a line of the position is not told from another one.
+fn of_two_lines([n, other]: [u32; 2]) -> String {
+    format!(
+        "the line of {n} per turn may as well be one of {other}, which looks the same at the stations that were fitted, and is \
+         another at those held out: it is not taken off there"
+    )
 }
 
 /// Says that a sensor counts the other way than the campaign states.

@@ -17,6 +17,8 @@ const SUSPECT: f64 = 1.5;
 const FEW: usize = 5;
 /// … and is odd where the model of the others leaves this many times as much of it as of the worst of them: engineering choice.
 const ODD: f64 = 5.0;
+/// A held-out run turns by another gain where that is off by more than this share, and by more than this share of a period in its length.
+const ANOTHER_GAIN: f64 = 0.05;
 /// A cause is named where it is most of what is left: without it less than this share remains, rms.
 const MOSTLY: f64 = 0.5;
 /// Gain ratios that differ by less are one.
@@ -57,6 +59,44 @@ pub(super) fn without_odd_runs(
         warnings.extend(contradiction([one, other], &model, &identify));
     }
     Ok((runs, model))
+}
+
+/// The held-out runs whose angle goes with their reference as that of the fitted ones does: each is judged after the best line through it,
+/// which makes nothing of a sensor that stands still or turns half as far.
+///
+/// # Errors
+/// Where none does.
+pub(super) fn held_out_as_fitted(
+    held: Vec<SensorRun>,
+    fitted: &[SensorRun],
+    model: &SensorModel,
+    period: f64,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorRun>, Refusal> {
+    let usual = fitted.iter().map(|run| scatter(&model.left(run))).fold(0.0, f64::max);
+    let gain = model.sensor.gain;
+    let odd = |run: &SensorRun| {
+        let left = model.left(run);
+        let (_, [_, slope]) = regressed(run, &left, |a| [1.0, a]);
+        let is_another =
+            slope.abs() > ANOTHER_GAIN * gain.abs() && slope.abs() * run.travel_rad() > ANOTHER_GAIN * period;
+        (is_another && scatter(&left) > ODD * usual).then(|| {
+            let turns = (gain + slope) / gain * gain.abs();
+            format!(
+                "its angle turns {turns:.4} times as far as its reference, that of the fitted runs {:.4} times",
+                gain.abs()
+            )
+        })
+    };
+    let why: Vec<Option<String>> = held.iter().map(odd).collect();
+    if let Some((run, Some(what))) = held.iter().zip(&why).next().filter(|_| why.iter().all(Option::is_some)) {
+        let wanted = "a held-out run, or a last quarter, in which the angle follows its reference";
+        return Err(Refusal::no_answer(&run.name, format!("held out, {what}"), wanted));
+    }
+    warnings.extend(
+        held.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?))),
+    );
+    Ok(held.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
 }
 
 /// Two runs that contradict each other: by itself each is described far better than by what both say, and neither describes the other.

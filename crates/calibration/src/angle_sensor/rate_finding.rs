@@ -74,26 +74,7 @@ pub(super) fn rate_finding(
     let value = sign * gain.abs();
     let applied_gain = sign * applied.gain.0.abs();
     let half_width = deviation.map_or(value.abs(), |deviation| T_PARTS * deviation);
-    let mut neutral_hypothesis = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
-    neutral_hypothesis.follows_input = neutral_hypothesis.angular_gain * model.sensor.gain > 0.0;
-    let mut hypothesis = Hypothesis {
-        angular_gain: applied_gain,
-        rate_bias_rad_s: applied.value(Term::Bias),
-        rate_bias_per_k_rad_s: thermal.as_ref().map_or(0.0, BiasOverTemperature::slope_rad_s_k),
-        reference_c: thermal.as_ref().map(BiasOverTemperature::reference_c),
-        ..neutral_hypothesis.clone()
-    };
-    let latency = applied.latency_s();
-    if latency != 0.0 {
-        let values = [latency, 0.0, 0.0, 0.0];
-        hypothesis.members.push(Member {
-            id: EffectId::AngleLatency,
-            values,
-            origin: Origin::Discovered,
-            refined: true,
-        });
-    }
-
+    let [neutral_hypothesis, hypothesis] = hypotheses(&model, &applied, thermal.as_ref(), sign, period);
     let samples = model.sensor.samples(&thinned, None);
     let mut warnings = said_of(&model, runs, held, by_nonlinearity.as_ref())?;
     if by_nonlinearity.as_ref().is_some_and(Nonlinearity::is_told) {
@@ -125,24 +106,7 @@ pub(super) fn rate_finding(
         warnings,
         raw: Some(Box::new(raw)),
         declared: Box::new(raw),
-        alone: model.answered.then(|| -> ByItself<'_> {
-            let (model, told) = (model.clone(), by_nonlinearity.filter(Nonlinearity::is_told));
-            // at one rate what goes with the rate is part of what the run tells
-            let turns_at_several =
-                move |run: &SensorRun| Stretch::new(run, 0, &sensor, 0.0).is_some_and(|s| tell_scale(&[s]));
-            let linear = move |run: &SensorRun| match told.as_ref().filter(|_| turns_at_several(run)) {
-                Some(told) => told.taken_out(run),
-                None => run.clone(),
-            };
-            let thermal = thermal.clone();
-            let runs: Vec<SensorRun> = at_one_temperature(thermal.as_ref(), &thinned).iter().map(&linear).collect();
-            Box::new(move |run| {
-                let Some(told) = &thermal else { return model.alone(&linear(run), &runs) };
-                let alone = model.alone(&linear(&told.taken_out(run)), &runs)?;
-                // a run has the bias of its own temperature
-                Some(Alone { bias: alone.bias.turned(told.mean_of(run)), ..alone })
-            })
-        }),
+        alone: model.answered.then(|| by_itself(&model, by_nonlinearity, thermal.clone(), &thinned)),
         discovered: Box::new(move |run| match &thermal {
             Some(told) => applied.left(&told.taken_out(run)),
             None => applied.left(run),
@@ -152,6 +116,57 @@ pub(super) fn rate_finding(
             sensor.samples(std::slice::from_ref(run), None).iter().map(|s| s.theta).collect()
         }),
         period,
+    })
+}
+
+/// The hypothesis that leaves the angle as it is, and the one that undoes what serves best without a nonlinearity, `applied`; `sign` is that
+/// of the angular gain.
+fn hypotheses(
+    model: &RateGyroscope,
+    applied: &RateGyroscope,
+    thermal: Option<&BiasOverTemperature>,
+    sign: f64,
+    period: f64,
+) -> [Hypothesis; 2] {
+    let mut neutral = Hypothesis::ideal(Instrument::Gyroscope, period, sign * model.sensor.gain.abs());
+    neutral.follows_input = neutral.angular_gain * model.sensor.gain > 0.0;
+    let mut hypothesis = Hypothesis {
+        angular_gain: sign * applied.gain.0.abs(),
+        rate_bias_rad_s: applied.value(Term::Bias),
+        rate_bias_per_k_rad_s: thermal.map_or(0.0, BiasOverTemperature::slope_rad_s_k),
+        reference_c: thermal.map(BiasOverTemperature::reference_c),
+        ..neutral.clone()
+    };
+    let latency = applied.latency_s();
+    if latency != 0.0 {
+        let values = [latency, 0.0, 0.0, 0.0];
+        let lag = Member { id: EffectId::AngleLatency, values, origin: Origin::Discovered, refined: true };
+        hypothesis.members.push(lag);
+    }
+    [neutral, hypothesis]
+}
+
+/// What a run tells by itself, beside what goes with the rate and with the temperature.
+fn by_itself(
+    model: &RateGyroscope,
+    nonlinearity: Option<Nonlinearity>,
+    thermal: Option<BiasOverTemperature>,
+    thinned: &[SensorRun],
+) -> ByItself<'static> {
+    let (model, told) = (model.clone(), nonlinearity.filter(Nonlinearity::is_told));
+    let sensor = model.sensor;
+    // at one rate what goes with the rate is part of what the run tells
+    let turns_at_several = move |run: &SensorRun| Stretch::new(run, 0, &sensor, 0.0).is_some_and(|s| tell_scale(&[s]));
+    let linear = move |run: &SensorRun| match told.as_ref().filter(|_| turns_at_several(run)) {
+        Some(told) => told.taken_out(run),
+        None => run.clone(),
+    };
+    let runs: Vec<SensorRun> = at_one_temperature(thermal.as_ref(), thinned).iter().map(&linear).collect();
+    Box::new(move |run| {
+        let Some(told) = &thermal else { return model.alone(&linear(run), &runs) };
+        let alone = model.alone(&linear(&told.taken_out(run)), &runs)?;
+        // a run has the bias of its own temperature
+        Some(Alone { bias: alone.bias.turned(told.mean_of(run)), ..alone })
     })
 }
 

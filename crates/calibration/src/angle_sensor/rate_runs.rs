@@ -7,7 +7,7 @@ use super::samples::{Reading, SensorRun};
 use crate::error::Refusal;
 use crate::numerics::angles::unwrapped;
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, robust_deviation, span};
+use crate::numerics::statistics::{line, median, robust_deviation, span};
 use crate::report::gate::unit;
 
 /// Share of the runs that may be left out.
@@ -16,6 +16,9 @@ const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
 /// other axes that turn with it and a random walk go into a run that turns little.
 const SHARE: f64 = 0.05;
 const DEVIATIONS: f64 = 3.0;
+/// A run whose reference moves by less than this share of what that of another does, with and without its own even rate, is at rest:
+/// references wander by a hundredth of what a hand or a table turns. Engineering choice.
+const AT_REST: f64 = 0.02;
 /// Parts of a run that tell a scale factor each.
 const PARTS: usize = 5;
 /// Rates are one value within this share of the fastest; a range ends where so many rows stand there …
@@ -51,8 +54,9 @@ pub(super) fn believed(
             "t_s in seconds: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map); or rows closer together",
         ));
     }
-    let gains: Vec<Option<[f64; 2]>> = runs.iter().map(|run| gain(run, period)).collect();
-    // a run that rests tells none
+    let rests = at_rest(&runs.iter().collect::<Vec<_>>());
+    let of = |(run, rests): (&SensorRun, &bool)| gain(run, period).filter(|_| !rests);
+    let gains: Vec<Option<[f64; 2]>> = runs.iter().zip(&rests).map(of).collect();
     let is_told = |[_, deviation]: &&[f64; 2]| DEVIATIONS * deviation < 0.5 * scale.abs();
     let mut told: Vec<f64> = gains.iter().flatten().filter(is_told).map(|[gain, _]| *gain).collect();
     let (common, whose) = match told.len() {
@@ -106,6 +110,24 @@ fn followed(run: &SensorRun, period: f64) -> Option<Vec<f64>> {
 
 fn steps(run: &SensorRun) -> Option<Vec<f64>> {
     Some(angle(run)?.windows(2).map(|w| (w[1] - w[0]).abs()).collect()).filter(|steps: &Vec<f64>| !steps.is_empty())
+}
+
+/// Which runs rest beside the others. Such a run tells no scale factor: what moves there is the noise of the reference, of which the angle
+/// has nothing.
+pub(super) fn at_rest(runs: &[&SensorRun]) -> Vec<bool> {
+    let moved: Vec<[f64; 2]> = runs.iter().map(|run| moved(run)).collect();
+    let farthest = [0, 1].map(|i| moved.iter().map(|m| m[i]).fold(0.0, f64::max));
+    moved.iter().map(|moved| (0..2).all(|i| moved[i] < AT_REST.powi(2) * farthest[i])).collect()
+}
+
+/// Mean squares of the reference of a run, rad²: about its mean, and beside an even rate.
+fn moved(run: &SensorRun) -> [f64; 2] {
+    let (slope, intercept) = line(&run.t_s, &run.reference_rad);
+    let count = run.len().max(1) as f64;
+    let mean = run.reference_rad.iter().sum::<f64>() / count;
+    let beside = run.t_s.iter().zip(&run.reference_rad).map(|(t, a)| a - slope * t - intercept);
+    [run.reference_rad.iter().map(|a| (a - mean).powi(2)).sum::<f64>(), beside.map(|e| e * e).sum::<f64>()]
+        .map(|sum| sum / count)
 }
 
 /// Scale factor of one run beside a bias of its own, and its standard deviation by how those of its parts scatter; none where

@@ -12,7 +12,7 @@ use cvg_model::Envelope;
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Role, Values};
 
 use super::rails::Rails;
-use crate::report::calibration::LARGEST_RATIO_OF_A_SENSOR;
+use crate::facts::LARGEST_RATIO_OF_A_SENSOR;
 
 /// Which of the parameters are there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

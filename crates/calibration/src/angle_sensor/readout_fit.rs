@@ -1,5 +1,6 @@
 //! The fit of a readout to what is known of it: the angle against the reference, and the radius, which a sensor holds.
 
+use super::ellipse;
 use super::readout::{Kind, Readout, Unknown};
 use super::samples::SensorRun;
 use crate::numerics::angles::wrapped;
@@ -255,4 +256,8 @@ fn damped_step(slopes: &[Vec<f64>], left: &[f64], damping: f64) -> Vec<f64> {
         equations.add(&row, *value);
     }
     equations.damped(damping).solve()
+}
+/// Where the fits of a readout begin.
+pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
+    [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
 }

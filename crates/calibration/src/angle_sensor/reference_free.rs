@@ -15,6 +15,7 @@ use super::readout::{Kind, Readout};
 use super::readout_fit::{Weighting, fit};
 use super::samples::{SensorRun, apart};
 use super::spikes::without_spikes;
+use crate::data::channel_ranges::require_one_unit;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member};
@@ -69,6 +70,7 @@ pub(crate) fn serves(campaign: &Campaign) -> bool {
 /// # Errors
 /// [`Refusal`] where they draw no closed curve.
 pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
+    require_one_unit(&campaign)?;
     let device = campaign.device.clone();
     let provenance = Provenance {
         tool: Some(Tool::default()),
@@ -77,6 +79,7 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         readout_unit: provenance::readout_unit(&campaign),
         covered_deg: None,
         radius_left: None,
+        gain_unknown: campaign.pole_pairs.or(campaign.angular_gain).is_none(),
     };
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);

@@ -1,9 +1,12 @@
 //! The report of a sensor or a rate gyroscope: the held-out error at each stage, what is left, and the facts of what was
 //! found, in the form that all instruments share.
 
+use std::collections::BTreeSet;
+
 use super::calibrated_rows::{covered_deg, radius_left};
 use super::curve::Curve;
 use super::rate_alone::Alone;
+use super::rate_runs::at_rest;
 use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
@@ -99,6 +102,7 @@ impl Head {
             readout_unit: self.readout_unit,
             covered_deg: covered_deg(&hypothesis, fitted),
             radius_left: radius_left(&hypothesis, fitted),
+            gain_unknown: false,
         };
         Calibration { device: self.device, hypothesis, provenance }
     }
@@ -136,7 +140,10 @@ impl Evaluated {
         let mut discovered = evaluate(&finding.discovered, held, None);
         let raw = finding.raw.as_ref().map(|raw| evaluate(raw, held, Some(&discovered)));
         let mut declared = evaluate(&finding.declared, held, Some(&discovered));
-        let reason = finding.reason.clone().or_else(|| {
+        let told = gate::gain_is_told(&finding.angular_gain) || !finding.effects.is_empty();
+        let untold = (finding.instrument == Instrument::Gyroscope && !told)
+            .then(|| "neither a bias, a scale factor nor a lag is told: nothing is undone".to_owned());
+        let reason = finding.reason.clone().or(untold).or_else(|| {
             let [left, nothing] = [discovered.size(), raw.as_ref()?.size()].map(|size| size.rms_deg);
             let alike = if finding.instrument == Instrument::Gyroscope { SAME_ERROR } else { 0.0 };
             (left > (1.0 + alike) * nothing).then(|| {
@@ -165,7 +172,7 @@ impl Evaluated {
 
     /// Samples that are set aside as spikes, in any of these runs.
     fn spikes(&self, runs: impl Iterator<Item = usize>) -> usize {
-        let numbers: std::collections::BTreeSet<usize> = runs.collect();
+        let numbers: BTreeSet<usize> = runs.collect();
         numbers.iter().map(|&n| self.on_fit.spikes_of(n) + self.discovered.spikes_of(n)).sum()
     }
 }
@@ -239,19 +246,11 @@ pub(crate) fn report(
         decay: None,
         warnings,
     };
+    let facts = facts(&finding, &report, &errors, fitted);
     let figures = Figures {
         bias: curves(held, raw.as_ref(), declared, discovered, finding.period),
         ring_downs: Vec::new(),
         channels: finding.readout.filter(|_| with_plots).map(|readout| Curve::new(&readout, held)),
-    };
-    let facts = Facts {
-        instrument: finding.instrument,
-        period_deg: finding.period.to_degrees(),
-        // what hardly turns has a bias, and a gain that nobody can judge
-        tells_gain: gate::gain_is_told(&report.angular_gain) || fitted.iter().any(turns),
-        stated: finding.stated_gain,
-        held_out: discovered.errors().count(),
-        fitted_rms_deg: errors.on_fit.size().rms_deg,
     };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
     let calibration = head.calibration(hypothesis, fitted);
@@ -396,6 +395,19 @@ fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained
     out
 }
 
+/// What the gate holds a report against.
+fn facts(finding: &Finding<'_>, report: &Report, errors: &Evaluated, fitted: &[SensorRun]) -> Facts {
+    Facts {
+        instrument: finding.instrument,
+        period_deg: finding.period.to_degrees(),
+        // what hardly turns has a bias, and a gain that nobody can judge
+        tells_gain: gate::gain_is_told(&report.angular_gain) || fitted.iter().any(turns),
+        stated: finding.stated_gain,
+        held_out: errors.discovered.errors().count(),
+        fitted_rms_deg: errors.on_fit.size().rms_deg,
+    }
+}
+
 /// What each run tells, the angular gains among that which contradict that of all, and how it goes with the temperature.
 fn runs(
     head: &Head,
@@ -407,6 +419,11 @@ fn runs(
     let mut out = head.runs.clone();
     let mut odd = Vec::new();
     let mut steady = vec![None; out.len()];
+    // a run that rests has a bias, and nothing of a scale factor
+    let all: Vec<&SensorRun> = fitted.iter().chain(held).collect();
+    let rests =
+        all.iter().zip(at_rest(&all)).filter(|(_, rests)| *rests && finding.instrument == Instrument::Gyroscope);
+    let rests: BTreeSet<usize> = rests.map(|(run, _)| run.number).collect();
     let both = fitted.iter().zip(&on_fit.segments).zip(&on_fit.kept).map(|x| (x, true));
     for (((run, s), kept), is_fit) in both.chain(held.iter().zip(&after.segments).zip(&after.kept).map(|x| (x, false)))
     {
@@ -419,7 +436,7 @@ fn runs(
         r.rms_deg = Some(own.size().rms_deg);
         let shared = fitted.iter().any(|f| f.number == run.number) && held.iter().any(|h| h.number == run.number);
         if is_fit || !shared {
-            warnings.extend(tell(r, run, finding, kept, &mut odd));
+            warnings.extend(tell(r, run, finding, kept, (!rests.contains(&run.number)).then_some(&mut odd)));
             let speed = run.rate_rad_s.iter().map(|w| w.abs()).sum::<f64>() / run.len() as f64;
             steady[run.number] = Some(rate).filter(|r| r.abs() > ONE_WAY * speed.to_degrees());
         }
@@ -446,13 +463,13 @@ fn runs(
 }
 
 /// Gain and bias as one run alone tells them, and the gain ratio of channels beside a temperature; says where they are not those of all
-/// runs, and adds the gain to `odd_gains` then.
+/// runs, and adds the gain to `odd_gains` then; a run that rests has none.
 fn tell(
     r: &mut RunReport,
     run: &SensorRun,
     finding: &Finding<'_>,
     kept: &[bool],
-    odd_gains: &mut Vec<f64>,
+    odd_gains: Option<&mut Vec<f64>>,
 ) -> Vec<String> {
     if r.temp_c.is_some() && run.channels().is_some() {
         r.detection_gain_ratio = super::ellipse::gain_ratio(&run.as_recorded());
@@ -463,7 +480,7 @@ fn tell(
     // the sign by which the campaign counts
     let counts_alike = value * finding.hypothesis.angular_gain >= 0.0;
     let gain = if counts_alike { alone.gain } else { Estimate { value: -value, ci95: [-high, -low] } };
-    r.angular_gain = Some(gain);
+    r.angular_gain = odd_gains.is_some().then_some(gain);
     let in_degrees = |e: Estimate| Estimate { value: e.value.to_degrees(), ci95: e.ci95.map(f64::to_degrees) };
     let bias = in_degrees(alone.bias);
     r.bias_dps = Some(bias);
@@ -480,9 +497,11 @@ fn tell(
         off > own.half_width() + all.half_width() && off * over > ODD * usual
     };
     // a scale factor that goes with the rate is said to, and runs at other rates do not contradict it
-    let is_odd = finding.scale_factor.is_none() && odd(&gain, &finding.angular_gain, turned);
+    let is_odd = odd_gains.is_some() && finding.scale_factor.is_none() && odd(&gain, &finding.angular_gain, turned);
     // a sensor's is a whole number, or stated
-    odd_gains.extend((is_odd && is_gyroscope).then_some(gain.value));
+    if let Some(odd_gains) = odd_gains {
+        odd_gains.extend((is_odd && is_gyroscope).then_some(gain.value));
+    }
     let covered = if is_gyroscope { ", whose interval covers both" } else { "" };
     let of_gain = is_odd.then(|| {
         format!(

@@ -10,7 +10,7 @@ use crate::data::copies::{copied_rows, said};
 use crate::data::interpolated::{self, interpolated_rows};
 use crate::data::plausibility::MOST_LOST;
 use crate::error::Refusal;
-use crate::numerics::angles::unwrapped;
+use crate::numerics::angles::{unwrapped, wrapped};
 use crate::numerics::statistics::{line, median, robust_deviation};
 
 /// Share of the runs that may be left out.
@@ -131,6 +131,16 @@ fn channels(run: &SensorRun) -> (Vec<f64>, Vec<f64>) {
     run.channels().into_iter().flatten().map(|z| (z[0], z[1])).unzip()
 }
 
+/// An angle followed through its period beside what it usually turns from row to row: between rows that are far apart it goes on as its
+/// reference does.
+fn followed(reference: &[f64], theta: &[f64], period: f64) -> Vec<f64> {
+    let steps = reference.windows(2).zip(theta.windows(2)).map(|(a, t)| (a[1] - a[0], wrapped(t[1] - t[0], period)));
+    let mut slopes: Vec<f64> = steps.filter(|(by, _)| *by != 0.0).map(|(by, turned)| turned / by).collect();
+    let usual = if slopes.is_empty() { 0.0 } else { median(&mut slopes) };
+    let beside = unwrapped(theta.iter().zip(reference).map(|(t, a)| wrapped(t - usual * a, period)), period);
+    beside.into_iter().zip(reference).map(|(e, a)| e + usual * a).collect()
+}
+
 /// How the angle of a run goes with its reference, by the ellipse of the run alone.
 fn follows(run: &SensorRun, stated: Option<f64>, period: f64) -> Follows {
     let theta: Vec<f64> = match &run.reading {
@@ -140,7 +150,7 @@ fn follows(run: &SensorRun, stated: Option<f64>, period: f64) -> Follows {
             v.iter().map(|z| readout.angle(*z)).collect()
         }
     };
-    let followed = unwrapped(theta.into_iter(), period);
+    let followed = followed(&run.reference_rad, &theta, period);
     let (slope, intercept) = line(&run.reference_rad, &followed);
     let size = stated.map_or(slope.abs(), f64::abs).max(1.0);
     let mut steps: Vec<f64> = run.reference_rad.windows(2).map(|w| size * (w[1] - w[0]).abs()).collect();
@@ -220,6 +230,17 @@ mod tests {
         for stated in [1.0, 5.0, 8.0] {
             let refusal = told(&runs, Some(stated)).expect_err("other poles");
             assert!(refusal.to_string().contains("turns 4.0000 times as far"), "{refusal}");
+        }
+    }
+
+    #[test]
+    fn a_gap_of_whole_turns_and_a_half_loses_no_turn() {
+        for missing in [450, 475, 500, 525, 550] {
+            let rows: Vec<usize> = (0..2000).filter(|i| !(700..700 + missing).contains(i)).collect();
+            let Follows::Turns(gain) = follows(&run("gap.csv", 1.0).subset(&rows), None, TAU) else {
+                panic!("{missing}")
+            };
+            assert!((gain - 1.0).abs() < 0.01, "{missing}: {gain}");
         }
     }
 

@@ -8,9 +8,8 @@ use rayon::prelude::*;
 
 use super::circle;
 use super::cross_validation::{
-    Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, losses_of_radius,
+    Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, finer, losses_of_radius,
 };
-use super::ellipse;
 use super::lines::{cover_a_turn, is_harmonic_of_table, strongest_and_its_aliases};
 use super::rails::Rails;
 use super::readout::{Competing, Kind, Readout, unknowns_of_texts};
@@ -138,6 +137,10 @@ impl<'a> Selection<'a> {
         // an effect as text that is not chosen has no say in what is
         let best = |t: &Tolerance| choose(&pool, *t).filter(|c| c.texts > 0).or(choose(&of_the_library, *t)).cloned();
         let mut chosen: Vec<_> = self.folds.tolerances().iter().filter_map(best).collect();
+        if let Some(only) = chosen.first().filter(|c| chosen.len() == 1 && c.texts == 0 && c.model.1 == constant) {
+            let readouts: Vec<_> = of_the_library.iter().filter(|c| c.model.1 == constant).cloned().collect();
+            chosen.splice(0..0, finer(&readouts, only));
+        }
         chosen.dedup_by(|simpler, first| simpler.model == first.model);
         let readout_alone = |among: &[Candidate<Model>]| {
             let without_table: Vec<_> = among.iter().filter(|c| c.model.1 == constant).cloned().collect();
@@ -536,11 +539,6 @@ pub(crate) fn fit_from(
     let begun = starts.iter().flat_map(|s| (0..onsets).map(move |onset| s.with_texts(texts, onset)));
     let fits = begun.filter_map(|s| fit(*kind, *weighting, runs, gain, &Readout { rails, ..s }));
     fits.min_by(|a, b| a.cost.total_cmp(&b.cost))
-}
-
-/// Where the fits of a readout begin.
-pub(crate) fn starts(runs: &[SensorRun], gain: f64) -> Vec<Readout> {
-    [ellipse::by_reference(runs, gain), ellipse::algebraic(runs)].into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! Rows that were not recorded but drawn: X and Y on the straight line between their neighbours, as where a file was resampled.
 //!
 //! A vibration whose angle turns by 2φ from one neighbour to the other bends away from their chord $c$ by the sagitta
-//! $s = c^2/8a$, with the amplitude $a$. Neither noise nor the shape of the readout takes that to nothing in row after row;
+//! $s = c^2/8a$, with the amplitude $a$; of channels with unequal gains, that of the circle that they draw with equal ones. Neither noise nor the shape of the readout takes that to nothing in row after row;
 //! linear interpolation does. Between the rows that were recorded the angle may have turned any number of times.
 
 use crate::data::plausibility::{Findings, leave_out as leave_out_rows, places, stretches};
+use crate::numerics::statistics::inner_range;
 use crate::recording::Recording;
 
 /// A row is on the chord where it is off by less than this share of the sagitta: what is drawn is off by rounding alone.
@@ -17,6 +18,8 @@ const BY_CHANCE: f64 = 0.05;
 const FEWEST: usize = 8;
 /// Rows that tell a channel's resolution.
 const ENOUGH: usize = 2000;
+/// Channels go round where each quarter about their middle has this share of the rows.
+const A_QUARTER: f64 = 0.05;
 
 /// Leaves out rows that lie on the straight line between their neighbours, and says so.
 pub(super) fn leave_out(recording: &mut Recording, name: &str, findings: &mut Findings) {
@@ -33,7 +36,7 @@ pub(crate) fn said(drawn: &[bool], t_s: &[f64]) -> Option<String> {
     let lost = drawn.iter().filter(|on| **on).count();
     (lost > 0).then(|| {
         format!(
-            "X and Y of {lost} of {} rows lie on straight lines between their neighbours, which a turning vibration does not: \
+            "X and Y of {lost} of {} rows lie on straight lines between their neighbours, which a turning angle does not: \
              {}; these rows were interpolated and are left out",
             drawn.len(),
             places(t_s, &stretches(drawn.len(), |i| drawn[i]))
@@ -46,6 +49,8 @@ pub(crate) fn said(drawn: &[bool], t_s: &[f64]) -> Option<String> {
 pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
     let rows = t.len();
     let mut drawn = vec![false; rows];
+    let circle = as_a_circle(x, y);
+    let (x, y) = circle.as_ref().map_or((x, y), |[x, y]| (x.as_slice(), y.as_slice()));
     let least = RESOLVED * f64::max(resolution(x), resolution(y));
     let mut judged = 0;
     for i in 1..rows.saturating_sub(1) {
@@ -66,6 +71,21 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
         drawn.fill(false);
     }
     drawn
+}
+
+/// Channels that go round, each from its middle and over its own range; none where they do not, of which nothing tells a range.
+fn as_a_circle(x: &[f64], y: &[f64]) -> Option<[Vec<f64>; 2]> {
+    let scaled = |v: &[f64]| -> Option<Vec<f64>> {
+        let [low, high] = inner_range(v)?;
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        (half > 0.0).then(|| v.iter().map(|v| (v - middle) / half).collect())
+    };
+    let [x, y] = [scaled(x)?, scaled(y)?];
+    let mut quarters = [0_usize; 4];
+    for (x, y) in x.iter().zip(&y) {
+        quarters[usize::from(*x > 0.0) + 2 * usize::from(*y > 0.0)] += 1;
+    }
+    quarters.iter().all(|n| *n as f64 > A_QUARTER * x.len() as f64).then_some([x, y])
 }
 
 /// The smallest distance between different values of a channel, of some of its rows: of a converter, its resolution.
@@ -111,6 +131,9 @@ mod tests {
         let drawn = |x: &[f64], y: &[f64]| interpolated_rows(&sound.t_s, x, y).contains(&true);
         let (Some(x), Some(y)) = (&sound.xc_v, &sound.yc_v) else { panic!() };
         assert!(!drawn(x, y));
+        // of unequal gains and about another origin
+        let eight_times: Vec<f64> = x.iter().map(|x| 8.0 * x - 3.0).collect();
+        assert!(!drawn(&eight_times, y) && !drawn(y, &eight_times));
         // twelve bits, and steps of less than one of theirs
         for rate_dps in [500.0, 20.0, 2.0] {
             let theta = |i: usize| 0.3 - 0.78 * (rate_dps * 0.01 * i as f64).to_radians();

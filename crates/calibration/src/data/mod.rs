@@ -3,6 +3,7 @@
 //! references that contradict each other, samples that are too far apart, runs that do not belong together.
 
 pub(crate) mod agreement;
+pub(crate) mod channel_ranges;
 pub(crate) mod copies;
 pub(crate) mod held_reference;
 pub(crate) mod interpolated;

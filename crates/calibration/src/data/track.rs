@@ -107,7 +107,7 @@ impl Track {
             track.hold_out_the_end();
         }
         if track.segments.is_empty() {
-            return Err(Refusal::new(&name, "too few samples are left after settling", "a longer run"));
+            return Err(Refusal::no_answer(&name, "too few samples are left after settling", "a longer run"));
         }
         let resolved = track.resolved(LARGEST_FIRST_TURN, track.mean_speed());
         track.stride = (track.t_s.len() / ENOUGH_SAMPLES).min(resolved).max(1);

@@ -4,7 +4,7 @@
 //!
 //! Within one pass time is a function of the angle, and harmonics enough make up any: neither has a share of its own then, and
 //! parts of opposite sign that cancel each other have shares of −100 and +100. Influences that the rows do not tell apart have
-//! one share together, as "pattern or time". They are those that have a direction in common (Hotelling's canonical correlation
+//! one share together, of the first and `shared_with` the others. They are those that have a direction in common (Hotelling's canonical correlation
 //! 1936) in which the error lies as well, and those whose parts cancel.
 
 use std::ops::Range;
@@ -49,14 +49,19 @@ pub(crate) fn decompose(error: &[f64], influences: &[Influence]) -> Vec<Share> {
     let groups = told_apart(&all, influences);
     let whole = shares(&all, &groups);
     let without: Vec<Vec<f64>> = moments.iter().map(|block| shares(&(&all - block), &groups)).collect();
-    let names = groups.iter().map(|group| group.of.join(" or ")).chain(["rest".to_owned()]);
+    let names = groups.iter().map(|group| group.of.as_slice()).chain([["rest"].as_slice()]);
     names
         .enumerate()
-        .map(|(i, of)| {
+        .map(|(i, names)| {
             let mean = without.iter().map(|w| w[i]).sum::<f64>() / BLOCKS as f64;
             let spread: f64 = without.iter().map(|w| (w[i] - mean).powi(2)).sum();
             let half = STUDENT_19 * ((BLOCKS - 1) as f64 / BLOCKS as f64 * spread).sqrt();
-            Share { of, share: whole[i], ci95: [whole[i] - half, whole[i] + half].map(|end| end.clamp(0.0, 1.0)) }
+            Share {
+                of: names[0].into(),
+                shared_with: names[1..].iter().map(ToString::to_string).collect(),
+                share: whole[i],
+                ci95: [whole[i] - half, whole[i] + half].map(|end| end.clamp(0.0, 1.0)),
+            }
         })
         .collect()
 }
@@ -241,7 +246,7 @@ mod tests {
             decompose(&error, &influences)
         };
         let shares = told(0.75);
-        assert_eq!(shares.iter().map(|s| s.of.as_str()).collect::<Vec<_>>(), ["pattern or time", "rest"], "{shares:?}");
+        assert_eq!(shares.iter().map(Share::named).collect::<Vec<_>>(), ["pattern or time", "rest"], "{shares:?}");
         assert!(shares[0].share > 0.95 && shares[0].ci95[0] > 0.9 && shares[0].ci95[1] <= 1.0, "{shares:?}");
         let shares = told(5.0);
         assert_eq!(shares[0].of, "pattern");
@@ -259,7 +264,7 @@ mod tests {
             &error,
             &[Influence { of: "rate", columns: vec![a] }, Influence { of: "time", columns: vec![other] }],
         );
-        assert_eq!(shares[0].of, "rate or time");
+        assert_eq!(shares[0].named(), "rate or time");
         for share in &shares {
             assert!(
                 (0.0..=1.0).contains(&share.share) && share.ci95.iter().all(|c| (0.0..=1.0).contains(c)),

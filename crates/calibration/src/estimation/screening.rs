@@ -2,6 +2,8 @@
 //!
 //! What is broken in a run is left out, rows or all of it, and named; what cannot be told from being right is refused.
 
+use std::f64::consts::PI;
+
 use crate::data::agreement::{Gain, RunGain, Verdict, verdict};
 use crate::data::plausibility::mend;
 use crate::data::sampling::{LARGEST_GAIN, Plausible, Sampling, Steps, other_turns, sampling, spread_over};
@@ -272,17 +274,17 @@ impl Screen {
             self.counts_as_stated(&moving)?;
         }
         let only = |m: &Motion| format!("the pattern turns through {:.1}° only", m.travel.to_degrees());
-        let is_far = |m: &Motion| m.travel >= std::f64::consts::PI;
+        let is_far = |m: &Motion| m.travel >= PI;
         let one_is_fitted = moving.iter().any(|(track, m)| track.samples(Role::Fit) > 0 && is_far(m));
         let is_short = |(_, m): &(Track, Motion)| one_is_fitted && !is_far(m);
-        let short = moving.iter().enumerate().filter(|(_, run)| is_short(run)).map(|(at, (_, m))| (at, only(m)));
-        let short: Vec<(usize, String)> = short.collect();
+        let of = |(at, run): (usize, &(Track, Motion))| is_short(run).then(|| (at, only(&run.1)));
+        let short: Vec<(usize, String)> = moving.iter().enumerate().filter_map(of).collect();
         let moving = self.without(moving, &short, warnings);
         let far_enough = |(track, motion): (Track, Motion)| {
             if is_far(&motion) {
                 return Ok((track, motion));
             }
-            Err(Refusal::new(&track.name, only(&motion), "at least half a turn (180°)"))
+            Err(Refusal::no_answer(&track.name, only(&motion), "at least half a turn (180°)"))
         };
         let mut ready = self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)?;
         let holds_out = |(track, _): &(Track, Motion)| track.samples(Role::Holdout) > 0;

@@ -181,7 +181,7 @@ fn parts<'a>(runs: &'a [DecayRun], fit: &'a Fit) -> Vec<Part<'a>> {
     runs.iter().zip(&fit.starts).map(|(run, start)| Part { run, from: 0, start: Some(start) }).collect()
 }
 
-/// θ̇ of the input at the mean rate of the runs, deg/h.
+/// θ̇ of the input at the mean rate of the runs, deg/h; none where they were turned at different rates, whose mean is no run's.
 fn precession(fit: &Fit, runs: &[DecayRun]) -> Estimate {
     let per_hour = SECONDS_PER_HOUR.to_degrees();
     if fit.model.has(Term::Precession) {
@@ -189,6 +189,9 @@ fn precession(fit: &Fit, runs: &[DecayRun]) -> Estimate {
         return Estimate { value: per_hour * e.value, ci95: e.ci95.map(|end| per_hour * end) };
     }
     let rate = runs.iter().map(DecayRun::mean_rate).sum::<f64>() / runs.len().max(1) as f64;
+    if !one_rate(runs) {
+        return Estimate::unknown();
+    }
     let (k, deviation) = (fit.model.value(Term::AngularGain), fit.deviation(Term::AngularGain));
     Estimate::new(-per_hour * k * rate, per_hour * deviation * rate.abs())
 }

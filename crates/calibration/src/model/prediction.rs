@@ -174,20 +174,7 @@ impl<'h> Predictor<'h> {
             return;
         }
         let gradient = Gradient::of(&z);
-        for (id, values) in &self.mechanics {
-            let (turn, grow) = gradient.along(&id.mechanics(values, &z));
-            out.theta_rate += turn;
-            out.growth += grow;
-        }
-        for (i, id, unit) in &self.units {
-            let (turn, grow) = gradient.along(&id.mechanics(unit, &z));
-            out.slopes[*i][THETA_RATE] = turn;
-            out.slopes[*i][GROWTH] = grow;
-        }
-        if let Some(i) = unknowns.damping {
-            out.slopes[i][GROWTH] = -1.0;
-        }
-        out.growth -= hypothesis.damping_per_s;
+        self.add_mechanics(&z, &gradient, out);
         if !recorded {
             self.steer(&seen, &gradient, at, out);
         }
@@ -206,6 +193,25 @@ impl<'h> Predictor<'h> {
                 }
             }
         }
+    }
+
+    /// What damping and mechanics do to the vibration, and a unit of each of their unknowns.
+    fn add_mechanics(&self, z: &Envelope<f64>, gradient: &Gradient, out: &mut Vibration) {
+        use quantity::{GROWTH, THETA_RATE};
+        for (id, values) in &self.mechanics {
+            let (turn, grow) = gradient.along(&id.mechanics(values, z));
+            out.theta_rate += turn;
+            out.growth += grow;
+        }
+        for (i, id, unit) in &self.units {
+            let (turn, grow) = gradient.along(&id.mechanics(unit, z));
+            out.slopes[*i][THETA_RATE] = turn;
+            out.slopes[*i][GROWTH] = grow;
+        }
+        if let Some(i) = self.unknowns.damping {
+            out.slopes[i][GROWTH] = -1.0;
+        }
+        out.growth -= self.hypothesis.damping_per_s;
     }
 
     /// What the loops do where nobody recorded it: forces along the pattern as it is read, as large as hold amplitude and

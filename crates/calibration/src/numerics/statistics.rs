@@ -73,6 +73,19 @@ pub(crate) fn span(values: &[f64]) -> f64 {
     if high > low { high - low } else { 0.0 }
 }
 
+/// Share of the values on either side that [`inner_range`] leaves out: spikes stand there.
+const OUTERMOST: f64 = 0.005;
+
+/// Smallest and largest value without the outermost; none of no values.
+pub(crate) fn inner_range(values: &[f64]) -> Option<[f64; 2]> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the values")]
+    let out = (OUTERMOST * values.len() as f64) as usize;
+    let last = values.len().checked_sub(1)?;
+    Some([sorted[out], sorted[last - out]])
+}
+
 /// Noise for tests: a first-order autoregression of normal values with a deviation of one, from a generator of Lehmer's.
 #[cfg(test)]
 pub(crate) fn remembered(memory: f64, count: usize, seed: u64) -> Vec<f64> {

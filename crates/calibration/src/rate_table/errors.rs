@@ -49,7 +49,8 @@ impl Errors {
             raw: Some(self.raw.size()),
             declared: self.declared.size(),
             discovered: self.discovered.size(),
-            noise_floor_deg: self.noise_floor.to_degrees(),
+            // the white part of what is left is none of more than that
+            noise_floor_deg: self.noise_floor.to_degrees().min(self.discovered.size().rms_deg),
         }
     }
 }

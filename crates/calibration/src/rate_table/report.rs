@@ -84,14 +84,7 @@ impl Found {
         let proposals = proposals(dataset, &fitted.fit, &errors.on_fit, &channels_left, &left);
         let mut unexplained = described(&fitted.fit.hypothesis, &self.steps);
         unexplained.extend(left);
-        let facts = Facts {
-            instrument: dataset.instrument,
-            period_deg: dataset.start.period_rad.to_degrees(),
-            tells_gain: true,
-            stated: dataset.screen.stated(),
-            held_out: errors.discovered.errors().count(),
-            fitted_rms_deg: errors.on_fit.mean_square().sqrt().to_degrees(),
-        };
+        let facts = self.facts();
         let mut runs = self.runs(head.runs, &mut warnings);
         warnings.extend(self.extrapolated());
         warnings.extend(fitted.fit.hypothesis.members.iter().filter_map(large_without_cause));
@@ -127,6 +120,7 @@ impl Found {
         report.warnings.extend(left_over(&report.heldout));
         self.allow_for_what_is_left(&mut report);
         one_interval_a_number(&mut report);
+        each_run_with_what_all_share(&mut report);
         let mut calibration = self.calibration(&report, head.amplitude_v);
         gate::pass(&report, &calibration, facts)?;
         if let Some(reason) = no_better(&report.heldout, facts.held_out) {
@@ -137,6 +131,18 @@ impl Found {
         let Self { dataset, fitted, steps, errors, .. } = self;
         let figures = figures(&dataset, Some(&errors.raw), &errors.declared, &errors.discovered, fitted.ring_downs);
         Ok(Identification { report, figures, calibration, steps, plots })
+    }
+
+    /// What the gate holds the report against.
+    fn facts(&self) -> Facts {
+        Facts {
+            instrument: self.dataset.instrument,
+            period_deg: self.dataset.start.period_rad.to_degrees(),
+            tells_gain: true,
+            stated: self.dataset.screen.stated(),
+            held_out: self.errors.discovered.errors().count(),
+            fitted_rms_deg: self.errors.on_fit.mean_square().sqrt().to_degrees(),
+        }
     }
 
     /// Widens the intervals of the angular gain and of the detection gain ratio by what can be in them of what is left of the
@@ -303,6 +309,16 @@ fn confounded(e: &EffectReport) -> String {
         e.confounded_with.join(", "),
         e.separated_by.as_deref().unwrap_or("another run")
     )
+}
+
+/// A run's own angular gain is what it adds to that of all runs, while the rest of the model is held: its interval holds
+/// what is not known of that too.
+fn each_run_with_what_all_share(report: &mut Report) {
+    let shared = report.angular_gain.half_width();
+    for own in report.runs.iter_mut().filter_map(|run| run.angular_gain.as_mut()) {
+        let half = own.half_width();
+        *own = own.widened(half.hypot(shared) - half);
+    }
 }
 
 /// A ratio of gains that stands for itself and as the parameter of an effect has the same interval in both places.

@@ -42,6 +42,8 @@ const MIRRORED: f64 = 0.5;
 const STANDS_STILL: f64 = 0.5;
 /// An error that grows by more than this factor grows by the calibration and not by chance.
 const WORSE: f64 = 1.05;
+/// An error below this, deg, is rounding of the columns: engineering choice.
+const FINEST_DEG: f64 = 1e-3;
 /// … where what of the radius goes with the angle is not within this factor of what the calibration left where it was made.
 const AS_CALIBRATED: f64 = 2.0;
 
@@ -65,7 +67,8 @@ pub(crate) fn require_of_the_calibrated(
     };
     let [turns, goes_round] = [turns(rows, h), goes_round(rows, h.period_rad, 1)];
     if turns {
-        let (gain, is_another) = turned(rows, h);
+        let (gain, is_another) =
+            if calibration.provenance.gain_unknown { (own_gain(rows, h.period_rad), false) } else { turned(rows, h) };
         if is_another {
             let (own, calibrated) = (gain * h.sense(), h.angular_gain);
             let problem = format!(
@@ -84,7 +87,7 @@ pub(crate) fn require_of_the_calibrated(
                 return refuse(problem, Some("--map 'theta_deg=-theta_deg'"));
             }
         }
-        if after > WORSE * before {
+        if after > WORSE * before.max(FINEST_DEG) {
             let problem =
                 format!("with the calibration undone its angle is off by {after:.4}°, as recorded by {before:.4}°");
             return refuse(problem, None);
@@ -193,6 +196,12 @@ fn turned(rows: &[Row], h: &Hypothesis) -> (f64, bool) {
     let is_reversed = h.instrument == Instrument::Sensor && reversed.1.abs() < as_it_was.1.abs();
     let (gain, off) = if is_reversed { reversed } else { as_it_was };
     (gain + off, off.abs() > SHARE * gain.abs() && off.abs() * speed > LARGEST_DRIFT_RAD_S)
+}
+
+/// How many times as far as the reference the compensated angle turns, with its sign, where nothing is known of that.
+fn own_gain(rows: &[Row], period: f64) -> f64 {
+    let input: Vec<f64> = rows.iter().map(|r| r.input_rad).collect();
+    line(&input, &unwrapped(rows.iter().map(|r| r.angle_rad[1]), period)).0
 }
 
 /// What the angle has beside that of an instrument of this gain, followed through its period.

@@ -8,6 +8,7 @@ use cvg_model::effects::{EffectId, Parameter};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Refusal;
+use crate::facts::LARGEST_RATIO_OF_A_SENSOR;
 use crate::model::angle_table::AngleTable;
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
 use crate::model::written::EffectText;
@@ -60,6 +61,8 @@ pub struct Provenance {
     /// how much of the radius goes with the angle in the rows that a sensor's readout was made of, with it undone, as a share; none where
     /// there are no channels
     pub radius_left: Option<f64>,
+    /// there was no reference, and nothing stated how often the angle goes round with it: the hypothesis' angular gain stands for nothing
+    pub gain_unknown: bool,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -69,7 +72,8 @@ struct File {
     device: String,
     instrument: String,
     period_deg: f64,
-    angular_gain: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    angular_gain: Option<f64>,
     follows_input: bool,
     force_scale_per_v_s: f64,
     control_latency_s: f64,
@@ -124,7 +128,7 @@ impl Calibration {
             device: self.device.clone(),
             instrument: h.instrument.name().into(),
             period_deg: h.period_rad.to_degrees().round(),
-            angular_gain: h.angular_gain,
+            angular_gain: (!self.provenance.gain_unknown).then_some(h.angular_gain),
             follows_input: h.follows_input,
             force_scale_per_v_s: h.force_scale,
             control_latency_s: h.control_latency_s,
@@ -202,7 +206,8 @@ impl Calibration {
             "sensor" => Instrument::Sensor,
             other => return refuse(format!("unknown instrument \"{other}\""), "gyroscope or sensor"),
         };
-        let mut hypothesis = Hypothesis::ideal(instrument, file.period_deg.to_radians(), file.angular_gain);
+        let mut hypothesis =
+            Hypothesis::ideal(instrument, file.period_deg.to_radians(), file.angular_gain.unwrap_or(1.0));
         hypothesis.follows_input = file.follows_input;
         hypothesis.force_scale = file.force_scale_per_v_s;
         hypothesis.control_latency_s = file.control_latency_s;
@@ -226,6 +231,7 @@ impl Calibration {
             readout_unit: file.readout_unit,
             covered_deg: file.covered_deg,
             radius_left: file.radius_left,
+            gain_unknown: file.angular_gain.is_none(),
         };
         Ok(Self { device: file.device, hypothesis, provenance })
     }
@@ -241,9 +247,6 @@ impl Calibration {
         Self::from_text(&text, &name)
     }
 }
-
-/// The largest ratio of the gains of two channels, of which each may be in a unit of its own, that leaves an angle: engineering choice.
-pub(crate) const LARGEST_RATIO_OF_A_SENSOR: f64 = 30.0;
 
 /// A value is one that the parameter can have. The library's bounds are of volts, and of two channels that were made alike; what a
 /// sensor's channels are in, millivolts or the counts of a converter, nobody says.

@@ -113,26 +113,15 @@ pub fn compensate(calibration: &Calibration, recording: &Recording) -> Result<Re
         });
     }
     require_of_the_calibrated(calibration, recording, &rows)?;
-    if let Some(left) = left_in_the_radius(calibration, &rows).filter(|_| channels) {
-        out.warnings.push(format!("{}: {left}", recording.source.display()));
-    }
-    if let Some(said) = counts_the_other_way(h, recording, &rows) {
-        out.warnings.push(format!("{}: {said}", recording.source.display()));
-    }
-    if let Some(said) = beyond_the_covered(calibration, &rows) {
-        out.warnings.push(format!("{}: {said}", recording.source.display()));
-    }
+    let said = [
+        left_in_the_radius(calibration, &rows).filter(|_| channels),
+        counts_the_other_way(h, recording, &rows),
+        beyond_the_covered(calibration, &rows),
+    ];
+    out.warnings.extend(said.into_iter().flatten().map(|said| format!("{}: {said}", recording.source.display())));
     if channels && recording.theta_deg.is_none() {
-        let mut last = angle_rad.first().copied().unwrap_or(0.0);
-        out.theta_deg = Some(
-            angle_rad
-                .iter()
-                .map(|angle| {
-                    last += wrapped(angle - last, h.period_rad);
-                    last.to_degrees()
-                })
-                .collect(),
-        );
+        let followed = unwrapped(angle_rad.into_iter(), h.period_rad);
+        out.theta_deg = Some(followed.into_iter().map(f64::to_degrees).collect());
     }
     Ok(out)
 }

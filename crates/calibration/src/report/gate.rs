@@ -136,10 +136,15 @@ fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
     }
     let suggestion = unit(k.value, facts.stated).unwrap_or("rates in deg/s, angles in deg and times in s").to_owned();
     let problem = facts.stated.map_or_else(
-        || format!("an angular gain of {:.4e} is none that a gyroscope can have", k.value),
-        |stated| format!("the angular gain is {:.4e}, and the campaign states {stated}", k.value),
+        || format!("an angular gain of {} is none that a gyroscope can have", plain(k.value)),
+        |stated| format!("the angular gain is {}, and the campaign states {stated}", plain(k.value)),
     );
     Err(Refusal::no_answer(&report.device, problem, suggestion))
+}
+
+/// A number with five digits, without a power of ten where it is near one.
+fn plain(value: f64) -> String {
+    if (1e-3..1e5).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.4e}") }
 }
 
 /// The unit in which rates, angles or times would have to be for a gain to be possible.

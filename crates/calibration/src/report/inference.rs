@@ -502,16 +502,24 @@ fn evidence(member: &Member, step: Option<&Step>) -> String {
             _ => format!("needed to centre the readout before there is an angle ({})", d.signature),
         };
     };
-    let rivals =
-        step.rivals.iter().map(|(id, gain)| format!("{id} by {:.0}", step.gain - gain)).collect::<Vec<_>>().join(", ");
-    let beaten = if rivals.is_empty() { String::new() } else { format!("; beat {rivals}") };
-    let balance = step.energy_balance.map_or_else(String::new, |[before, after]| {
-        format!("; the energy balance leaves {:.1} ppm of the amplitude instead of {:.1}", 1e6 * after, 1e6 * before)
+    let mut compared = String::new();
+    for (id, gain) in &step.rivals {
+        let lead = step.gain - gain;
+        compared += &if lead >= 0.0 {
+            format!("; beat {id} by {lead:.0}")
+        } else {
+            format!("; preferred by its plainness or by the energy balance to {id}, which gained {:.0} more", -lead)
+        };
+    }
+    let ppm = |balance: f64| format!("{:.1}", 1e6 * balance);
+    let balance = step.energy_balance.map(|[before, after]| [ppm(before), ppm(after)]).filter(|[b, a]| a != b);
+    let balance = balance.map_or_else(String::new, |[before, after]| {
+        format!("; the energy balance leaves {after} ppm of the amplitude instead of {before}")
     });
     let inconsistency =
         step.inconsistency.as_ref().map_or_else(String::new, |why| format!("; not claimed as a cause: {why}"));
     format!(
-        "{}; gained {:.0} in 2 ln likelihood after its price{beaten}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
+        "{}; gained {:.0} in 2 ln likelihood after its price{compared}; held-out rms {:.5}° to {:.5}°{balance}{inconsistency}",
         d.signature, step.gain, step.heldout_rms_deg[0], step.heldout_rms_deg[1]
     )
 }

@@ -29,6 +29,8 @@ use crate::selection::trial::{
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 8;
+/// A description is as good as another that leaves this share of its mean square: an engineering choice, 5 % of what is left.
+const NEARLY_AS_WELL: f64 = 1.1;
 
 /// Adds effects to a fitted hypothesis until the residual asks for no more.
 ///
@@ -219,13 +221,14 @@ fn amplitude_evidence(dataset: &Dataset, trials: &mut [Trial], before: Option<f6
 fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, Vec<EffectId>)> {
     let best = trials.first().filter(|t| t.gain >= LEAST_GAIN)?;
     let empirical = |t: &&Trial| t.refuted || !apart.can_be_named(&t.candidate);
-    let described = trials.iter().find(empirical);
+    let described =
+        trials.iter().find(empirical).map(|first| if apart.rates { first } else { plainest(first, trials) });
     let level = |t: &&Trial| !empirical(t) && t.gain >= best.gain - LEAST_LEAD && t.gain >= LEAST_GAIN;
     // of causes that explain the angle equally well, the one that closes the energy balance
     let told_from = |t: &Trial, other: &Trial| t.balance.zip(other.balance).is_some_and(|(a, b)| a < BY_AMPLITUDE * b);
     let leader = trials.iter().find(level);
     let Some(library) = leader.map(|l| trials.iter().filter(level).find(|t| told_from(t, l)).unwrap_or(l)) else {
-        return Some((best, Origin::Empirical, Vec::new()));
+        return Some((described.unwrap_or(best), Origin::Empirical, Vec::new()));
     };
     let rivals: Vec<&Trial> = trials
         .iter()
@@ -251,6 +254,17 @@ fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, V
         }
         None => Some((library, Origin::Discovered, rivals)),
     }
+}
+
+/// What describes the samples of one rate without a claim to be their cause: a harmonic or a line rather than an effect of the library that these
+/// runs can't show to act, where it describes them nearly as well. At another rate that effect would do something else.
+fn plainest<'a>(first: &'a Trial, trials: &'a [Trial]) -> &'a Trial {
+    if first.refuted {
+        return first;
+    }
+    let most = NEARLY_AS_WELL * mean_square(&first.fit);
+    let describes = |t: &&Trial| t.candidate.id.description().empirical && t.gain >= LEAST_GAIN;
+    trials.iter().filter(describes).find(|t| mean_square(&t.fit) <= most).unwrap_or(first)
 }
 
 /// Drops effects whose place the final data does not support.

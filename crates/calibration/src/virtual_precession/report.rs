@@ -175,7 +175,7 @@ impl Finding<'_> {
             let parameters = description.parameters.iter().zip(values).zip(deviations);
             EffectReport {
                 id: description.id.into(),
-                origin: Origin::Declared,
+                origin: if description.declared { Origin::Declared } else { Origin::Discovered },
                 parameters: parameters.map(|((p, value), d)| entry(p.name, p.unit, value, d)).collect(),
                 heldout_rms_deg: None,
                 evidence: evidence(id).into(),
@@ -183,7 +183,7 @@ impl Finding<'_> {
                 separated_by: None,
             }
         };
-        self.members().into_iter().map(report).collect()
+        self.members().into_iter().map(report).filter(does_something).collect()
     }
 
     /// What no effect of the library says.
@@ -251,6 +251,14 @@ impl Finding<'_> {
         })?;
         Ok(calibration)
     }
+}
+
+/// An effect that is worth nothing within the intervals of its parameters is none.
+fn does_something(effect: &EffectReport) -> bool {
+    let Some(id) = EffectId::from_id(&effect.id) else { return true };
+    let is_neutral =
+        |(p, neutral): (&ParameterReport, f64)| p.ci95.is_some_and(|[low, high]| low <= neutral && neutral <= high);
+    !effect.parameters.iter().zip(id.neutral()).all(is_neutral)
 }
 
 /// What speaks for an effect.

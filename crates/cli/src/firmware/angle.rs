@@ -39,9 +39,8 @@ pub(super) fn text(calibration: &Calibration, left_out: &[String], form: Form, p
         call.to_owned(),
         String::new(),
         format!(
-            "theta_deg is the angle that the sensor gives, in degrees and of any turn; the answer is from 0 up to {:.0} degrees, {}. Nothing is kept between calls.",
-            h.period_rad.to_degrees(),
-            periods(h)
+            "theta_deg is the angle that the sensor gives, in degrees and of any turn; the answer is {}. Nothing is kept between calls.",
+            periods(calibration)
         ),
     ];
     if form == Form::Rust && sin_cos {

@@ -120,11 +120,7 @@ fn header(calibration: &Calibration, steps: &[Step], left_out: &[String], points
         "    float angle_deg = cvg_compensate(x, y);".into(),
         String::new(),
         "x and y are the readings of the two channels in the unit in which they were calibrated; the angle is the sensor's own,".into(),
-        format!(
-            "from 0 up to {:.0} degrees, {}. Nothing is kept between calls.",
-            h.period_rad.to_degrees(),
-            periods(h)
-        ),
+        format!("{}. Nothing is kept between calls.", periods(calibration)),
     ];
     if let Some([low, high]) = calibration.provenance.amplitude_v {
         how.push(format!("Calibrated at amplitudes from {low:.6} to {high:.6}; beyond them it is extrapolated."));

@@ -1,8 +1,10 @@
 //! `cvg firmware`: the correction of an angle sensor for a controller without the crates. Of two channels a C header with
-//! `cvg_compensate(x, y)`, of an angle one with `cvg_compensate(theta)`, in C or in Rust; or a table of the angle alone.
+//! `cvg_compensate(x, y)`, of an angle one with `cvg_compensate(theta)`, in C or in Rust; or a table of the angle alone. Of a whole-angle
+//! gyroscope the effects that the settings of its electronics take.
 
 mod angle;
 mod channels;
+mod gyroscope;
 
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -14,6 +16,8 @@ use cvg_model::effects::{Inverse, Stage};
 
 use crate::{Failure, output};
 
+/// Periods beyond this are a whole turn, and no pattern's half.
+const WHOLE_TURN_RAD: f64 = 4.0;
 /// Points of a period at which a table is checked, for each of its own.
 const CHECKED: usize = 16;
 /// Points of a table where nobody says how many.
@@ -31,12 +35,14 @@ enum Form {
 }
 
 impl Form {
-    fn of(file: &Path) -> Self {
+    /// The form that the name of a file asks for.
+    fn of(file: &Path) -> Result<Self, Failure> {
         let is = |name: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
-        match (is("csv"), is("rs")) {
-            (true, _) => Self::Csv,
-            (_, true) => Self::Rust,
-            _ => Self::C,
+        match () {
+            () if is("csv") => Ok(Self::Csv),
+            () if is("rs") => Ok(Self::Rust),
+            () if is("h") || is("hpp") => Ok(Self::C),
+            () => Err(Failure::input(format!("--out {}: wanted a name that ends in .h, .rs or .csv", file.display()))),
         }
     }
 }
@@ -45,13 +51,24 @@ impl Form {
 pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: Option<usize>) -> Result<(), Failure> {
     let inputs: [PathBuf; 1] = [calibration_file.to_owned()];
     output::check_file(out, &inputs)?;
+    let form = Form::of(out)?;
     if let Some(points) = points.filter(|points| !(8..=65_536).contains(points)) {
         return Err(Failure::input(format!("--points {points}: wanted 8 to 65536")));
     }
     let calibration = Calibration::read(calibration_file)?;
     let h = &calibration.hypothesis;
+    if h.instrument != Instrument::Sensor && h.period_rad > WHOLE_TURN_RAD {
+        return Err(Failure::input(format!("{}: {}", calibration_file.display(), of_a_rate_gyroscope(h))));
+    }
     if h.instrument != Instrument::Sensor {
-        return Err(Failure::input(format!("{}: {}", calibration_file.display(), of_a_gyroscope(h))));
+        let left_out: Vec<String> = gyroscope::left_out(&calibration).into_iter().map(with_values).collect();
+        let text = gyroscope::text(&calibration, &left_out, form)?;
+        if !left_out.is_empty() {
+            output::tell(format_args!("not in it: {}, which no sample alone tells", left_out.join(", ")));
+        }
+        output::write(out, text.as_bytes(), &inputs)?;
+        output::tell(format_args!("wrote {}", out.display()));
+        return Ok(());
     }
     let left_out: Vec<String> = h.members.iter().filter(|m| is_left_out(m)).map(with_values).collect();
     let of_an_angle = is_of_an_angle(&calibration);
@@ -67,9 +84,9 @@ pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: Option<usize
         if h.angle_table.is_none() {
             output::tell(format_args!("nothing was found to be corrected: the angle is given as it is read"));
         }
-        angle::text(&calibration, &left_out, Form::of(out), points)
+        angle::text(&calibration, &left_out, form, points)
     } else {
-        channels::text(&calibration, &left_out, Form::of(out), points.unwrap_or(POINTS))?
+        channels::text(&calibration, &left_out, form, points.unwrap_or(POINTS))?
     };
     output::write(out, text.as_bytes(), &inputs)?;
     output::tell(format_args!("wrote {}", out.display()));
@@ -82,26 +99,17 @@ fn is_of_an_angle(calibration: &Calibration) -> bool {
     calibration.provenance.amplitude_v.is_none() && h.clip.is_none() && h.members.iter().all(is_left_out)
 }
 
-/// Why there is no header of this gyroscope, and what there is.
-fn of_a_gyroscope(h: &Hypothesis) -> String {
-    if h.period_rad > 4.0 {
-        let of_the_temperature =
-            h.reference_c.filter(|_| h.rate_bias_per_k_rad_s != 0.0).map_or_else(String::new, |at| {
-                format!(
-                    " and {:.9} deg/s more for every kelvin beyond {at:.3} °C",
-                    h.rate_bias_per_k_rad_s.to_degrees()
-                )
-            });
-        return format!(
-            "the calibration of a rate gyroscope is two numbers: take its bias, {:.9} deg/s{of_the_temperature}, from each rate, and \
-             divide by its scale factor, {:.9}",
-            h.rate_bias_rad_s.to_degrees(),
-            h.angular_gain.abs()
-        );
-    }
-    "the calibration of a gyroscope, whose angle takes four components and the loops; in C that is cvg.h, in Rust \
-     `cvg_estimator::Compensation` (chapter Firmware and C)"
-        .into()
+/// Why there is no header of a rate gyroscope, and what there is.
+fn of_a_rate_gyroscope(h: &Hypothesis) -> String {
+    let of_the_temperature = h.reference_c.filter(|_| h.rate_bias_per_k_rad_s != 0.0).map_or_else(String::new, |at| {
+        format!(" and {:.9} deg/s more for every kelvin beyond {at:.3} °C", h.rate_bias_per_k_rad_s.to_degrees())
+    });
+    format!(
+        "the calibration of a rate gyroscope is two numbers: take its bias, {:.9} deg/s{of_the_temperature}, from each rate, and \
+         divide by its scale factor, {:.9}",
+        h.rate_bias_rad_s.to_degrees(),
+        h.angular_gain.abs()
+    )
 }
 
 /// An effect that what is read at one moment does not tell.
@@ -111,10 +119,15 @@ fn is_left_out(m: &Member) -> bool {
         && (id.description().stage != Stage::Readout || id.acts_on_angle() || id.in_time() || id.by_temperature())
 }
 
-/// How many periods the angle has.
-fn periods(h: &Hypothesis) -> String {
+/// The range of the angle, and how many periods it has.
+fn periods(calibration: &Calibration) -> String {
+    let h = &calibration.hypothesis;
+    let range = format!("from 0 up to {:.0} degrees", h.period_rad.to_degrees());
+    if calibration.provenance.gain_unknown {
+        return range;
+    }
     let count = h.angular_gain.abs();
-    format!("{count} {} a turn of the reference", if count == 1.0 { "period" } else { "periods" })
+    format!("{range}, {count} {} a turn of the reference", if count == 1.0 { "period" } else { "periods" })
 }
 
 /// An effect by its name, with its values.

@@ -23,7 +23,8 @@ pub(crate) fn further(r: &Report) -> Vec<Number<'_>> {
     });
     let decay = r.decay.iter().flat_map(|d| {
         let bend = d.frequency_per_energy.map(|e| ("frequency over energy dω/dE", e, "rad/s/V²"));
-        [("decay time constant τ", d.tau_s, "s"), ("precession", d.precession_dph, "deg/h")].into_iter().chain(bend)
+        let precession = Some(("precession", d.precession_dph, "deg/h")).filter(|(_, e, _)| e.is_told());
+        [("decay time constant τ", d.tau_s, "s")].into_iter().chain(precession).chain(bend)
     });
     let across = r.misalignment.iter().filter_map(|m| {
         let name = Cow::Owned(format!("misalignment, {}", m.file));

@@ -70,7 +70,12 @@ impl Sharpness {
     }
 
     fn mantissa(self, value: f64) -> String {
-        format!("{:.*}", self.digits, value / 10f64.powi(self.exponent))
+        let shown = format!("{:.*}", self.digits, value / 10f64.powi(self.exponent));
+        // nothing has no sign
+        match shown.strip_prefix('-') {
+            Some(nothing) if nothing.bytes().all(|b| b == b'0' || b == b'.') => nothing.to_owned(),
+            _ => shown,
+        }
     }
 
     fn power(self) -> String {
@@ -78,8 +83,16 @@ impl Sharpness {
     }
 }
 
-/// A value as sharp as it is known, with the half width of its interval.
+/// The sides of an interval differ by more than this share of its half width where it is shown by its ends.
+const UNEVEN: f64 = 0.2;
+
+/// A value as sharp as it is known, with the half width of its interval, or with its ends where the value is not in the middle.
 pub(crate) fn measured(value: f64, ci95: Option<[f64; 2]>) -> String {
+    if let Some(ends) = ci95.filter(|[low, high]| ((high - value) - (value - low)).abs() > UNEVEN * 0.5 * (high - low))
+    {
+        let [value, low, high] = interval(value, ends);
+        return format!("{value} ({low} … {high})");
+    }
     let half_width = ci95.map_or(0.0, |c| 0.5 * (c[1] - c[0]));
     match Sharpness::of(value, half_width) {
         Some(s) if s.exponent == 0 => format!("{} ± {}", s.mantissa(value), s.mantissa(half_width)),

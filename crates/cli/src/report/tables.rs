@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use cvg_calibration::Identification;
-use cvg_calibration::report::{EffectReport, Estimate, ParameterReport, Report, RunReport, Temperature};
+use cvg_calibration::report::{EffectReport, Estimate, ParameterReport, Report, RunReport, Share, Temperature};
 use cvg_model::effects::EffectId;
 
 use super::escape;
@@ -298,6 +298,17 @@ fn left(h: &mut String, r: &Report) {
     });
 }
 
+/// What a share goes with: harmonics of the pattern angle that grow or change their sign are no shares of the angle alone.
+fn followed(share: &Share) -> String {
+    match share.named().as_str() {
+        "amplitude" => "pattern angle, by the square of the amplitude".into(),
+        "direction" => "pattern angle, by the direction of rotation".into(),
+        "rate" => "pattern angle, by the inverse of the rate".into(),
+        "pattern" => "pattern angle, the same in every run".into(),
+        other => other.into(),
+    }
+}
+
 /// What the error that the declared model leaves is a function of.
 fn shares(h: &mut String, r: &Report) {
     if r.decomposition.is_empty() {
@@ -306,7 +317,7 @@ fn shares(h: &mut String, r: &Report) {
     table(h, "What the declared model's residual follows", &["it follows", "share of its variance", "95 %"], |h| {
         for s in &r.decomposition {
             let [low, high] = s.ci95.map(|v| format!("{:.1} %", 100.0 * v));
-            row(h, &[&escape(&s.of), &format!("{:.1} %", 100.0 * s.share), &format!("{low} … {high}")]);
+            row(h, &[&escape(&followed(s)), &format!("{:.1} %", 100.0 * s.share), &format!("{low} … {high}")]);
         }
     });
 }

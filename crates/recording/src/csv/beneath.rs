@@ -29,7 +29,9 @@ pub(super) fn units(head: &Head, line: &[u8]) -> Option<Vec<(Channel, String)>> 
         }
         let unit = in_letters(content);
         let unit = units::bare(&unit);
-        if cell::read(content, Decimal::Point) == Cell::Missing || unit.chars().all(|c| c == '-') {
+        // nanoamperes, and no value that is "not available"
+        let is_missing = cell::read(content, Decimal::Point) == Cell::Missing && unit != "nA";
+        if is_missing || unit.chars().all(|c| c == '-') {
             continue;
         }
         if is_remark && units::conversion(channel, unit).is_none() {
