@@ -146,9 +146,7 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     let hidden = if chosen.many_angles { Vec::new() } else { unseen_near_one_angle(&final_fit, detuning, all) };
     final_fit = instead.iter().fold(final_fit, |f, other| f.or(&other.model));
     let seen = final_fit.clone();
-    if chosen.many_angles {
-        final_fit = beside_unseen_readout(final_fit, all);
-    }
+    final_fit = beside_unseen_readout(final_fit, chosen.many_angles, all);
     final_fit = unseen.iter().chain(&hidden).fold(final_fit, Fit::beside);
     let final_declared =
         if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };

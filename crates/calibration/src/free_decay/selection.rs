@@ -201,6 +201,9 @@ fn price(of: &Fit, cause: Term) -> f64 {
 /// Causes that a linearisation does not rule out, as what is there or as its rival: a fit to each takes a hundred times as long.
 fn worth_trying(best: &Fit, candidates: Vec<Term>, data: Data<'_>) -> Vec<Term> {
     let open: Vec<Term> = candidates.into_iter().filter(|t| !best.model.has(*t)).collect();
+    if open.is_empty() {
+        return open;
+    }
     let Some(beyond) = Beyond::of(best, &open, data) else { return open };
     let gains: Vec<f64> = open.iter().map(|cause| beyond.gain(*cause)).collect();
     let largest = gains.iter().copied().filter(|g| g.is_finite()).fold(0.0, f64::max);
@@ -251,9 +254,13 @@ fn readouts(runs: &[DecayRun]) -> Vec<Term> {
 
 /// The fit with intervals that hold a readout that was not seen: gains, axes, a phase and offsets together, since what one of
 /// them leaves in the decays another takes away. At one rate, where the orbit's motion seen through a readout is that of other
-/// mechanics, these are as wide as what is believed of a readout.
-pub(crate) fn beside_unseen_readout(fitted: Fit, data: Data<'_>) -> Fit {
-    let unseen: Vec<Term> = readouts(data.runs).into_iter().filter(|t| !fitted.model.has(*t)).collect();
+/// mechanics, these are as wide as what is believed of a readout. Near one angle it is offsets alone; see [`unseen_near_one_angle`].
+pub(crate) fn beside_unseen_readout(fitted: Fit, many_angles: bool, data: Data<'_>) -> Fit {
+    let is_unseen = |t: &Term| !fitted.model.has(*t) && (many_angles || OFFSETS.contains(t));
+    let unseen: Vec<Term> = readouts(data.runs).into_iter().filter(is_unseen).collect();
+    if unseen.is_empty() {
+        return fitted;
+    }
     let Some(beyond) = Beyond::of(&fitted, &unseen, data) else { return fitted };
     let energy = data.runs.iter().flat_map(|r| &r.seen).map(energy).fold(f64::MIN_POSITIVE, f64::max);
     fitted.beyond(&beyond, |term| match term {
