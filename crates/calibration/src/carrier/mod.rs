@@ -3,6 +3,7 @@
 //! other. Nothing is held beside the columns that were read but the envelopes.
 
 mod found;
+mod rails;
 mod windows;
 
 use std::ops::Range;
@@ -29,8 +30,9 @@ pub(crate) fn demodulated(mut campaign: Campaign) -> Result<Campaign, Refusal> {
             continue;
         }
         let name = run.file.display().to_string();
-        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz)?;
-        run.recording = if run.kind == RunKind::Decay { envelopes } else { in_phase(envelopes) };
+        let is_decay = run.kind == RunKind::Decay;
+        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz, is_decay)?;
+        run.recording = if is_decay { envelopes } else { in_phase(envelopes) };
     }
     Ok(campaign)
 }
@@ -51,11 +53,17 @@ impl Carrier<'_> {
     }
 }
 
-fn recording(r: Recording, name: &str, stated_hz: Option<f64>) -> Result<Recording, Refusal> {
+fn recording(r: Recording, name: &str, stated_hz: Option<f64>, is_decay: bool) -> Result<Recording, Refusal> {
     let (Some(x), Some(y)) = (&r.x_v, &r.y_v) else { return Ok(r) };
     let carrier = Carrier { t_s: &r.t_s, x, y };
     let frequency_hz = found::frequency(carrier, name, stated_hz)?;
-    let seen = windows::demodulate(carrier, frequency_hz);
+    let mut seen = windows::demodulate(carrier, frequency_hz);
+    let rails = rails::Rails::of(carrier);
+    // a decay goes on below its rails; a rotation that is held at them has nothing else
+    let flat = if is_decay { rails.leave_out(carrier, &mut seen) } else { 0 };
+    if seen.len() < 2 && flat > 0 {
+        return Err(Refusal::no_answer(name, rails.said(), "channels whose range is wider than the vibration"));
+    }
     if seen.len() < 2 {
         return Err(Refusal::no_answer(
             name,
@@ -83,6 +91,11 @@ fn recording(r: Recording, name: &str, stated_hz: Option<f64>) -> Result<Recordi
         }
     }
     out.warnings.extend(remarks(&r, name, frequency_hz, &seen));
+    if rails.are_reached() {
+        let left_out =
+            if is_decay { format!("{flat} windows with such rows are left out") } else { "they are used".into() };
+        out.warnings.push(format!("{name}: {}: {left_out}", rails.said()));
+    }
     Ok(out)
 }
 

@@ -1,5 +1,5 @@
 //! Carrier to envelopes. Evenly sampled carriers go through the demodulator of the electronics; others, and those of more
-//! points a period than it takes, are fitted by x = o + x_c cos φ + x_s sin φ at the times of their rows. Either way the
+//! points a period than it takes, or of too few of its windows, are fitted by x = o + x_c cos φ + x_s sin φ at the times of their rows. Either way the
 //! rest point is part of the fit. The demodulator's reference follows the carrier; a window of two periods needs none that
 //! follows.
 
@@ -36,6 +36,10 @@ const FEWEST_ROWS: usize = 16;
 const MOST_ROWS: usize = 10_000;
 /// Periods of a window that is fitted at the times of its rows: whole ones, so that the rest point stays out of them.
 const FITTED_PERIODS: f64 = 2.0;
+/// Windows of the demodulator that are enough, and fitted ones of two periods, of which a quarter is held out; where there are
+/// fewer, they are shorter. Engineering choice.
+const ENOUGH_MIXED: usize = 256;
+const ENOUGH_FITTED: f64 = 128.0;
 /// Share of a phase's change from window to window that the reference's frequency follows.
 const FOLLOWED: f64 = 0.1;
 /// The furthest that the reference goes from where the carrier was found.
@@ -82,6 +86,9 @@ fn mixed(carrier: &Carrier<'_>, frequency_hz: f64, step_s: f64) -> Option<Vec<Wi
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count, saturating")]
     let each = (enough as usize).max(FEWEST_ROWS).max(rows.div_ceil(MOST_WINDOWS)).min(MOST_ROWS);
     let largest = carrier.x.iter().chain(carrier.y).fold(0.0, |m: f64, v| m.max(v.abs()));
+    if rows / each < ENOUGH_MIXED {
+        return None;
+    }
     let demodulator = Demodulator::<f64>::new(u16::try_from(each).ok()?, 2.0 * largest).ok()?;
     let limit_rad_s = (FURTHEST * std::f64::consts::TAU * frequency_hz).min(0.1 / step_s);
     let oscillator = Oscillator::<f64>::new(frequency_hz, step_s, limit_rad_s).ok()?;
@@ -118,16 +125,18 @@ fn fitted(carrier: &Carrier<'_>, frequency_hz: f64, step_s: f64) -> Vec<Window> 
     let duration_s = t[t.len() - 1] - t[0];
     let rows_of = |periods: f64| periods / (frequency_hz * step_s);
     let needed = (FEWEST_ROWS as f64 / rows_of(1.0)).max(duration_s * frequency_hz / MOST_WINDOWS as f64);
-    let length_s = needed.max(FITTED_PERIODS).ceil() / frequency_hz;
+    let windows_of = |periods: f64| duration_s * frequency_hz / needed.max(periods).ceil();
+    let periods = if windows_of(FITTED_PERIODS) < ENOUGH_FITTED { 1.0 } else { FITTED_PERIODS };
+    let length_s = needed.max(periods).ceil() / frequency_hz;
+    // of a short film, windows that overlap by half: what they have in common is noise that remembers
+    let step_s = if windows_of(periods) < ENOUGH_FITTED { 0.5 * length_s } else { length_s };
     let mut out = Vec::new();
-    let mut at = 0;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count, saturating")]
-    let count = (duration_s / length_s) as usize;
+    let count = ((duration_s - length_s) / step_s).floor() as usize + 1;
     for k in 0..count {
-        let from_s = t[0] + k as f64 * length_s;
-        let end = at + t[at..].partition_point(|t| *t < from_s + length_s);
-        let rows = at..end;
-        at = end;
+        let from_s = t[0] + k as f64 * step_s;
+        let place = |at_s: f64| t.partition_point(|t| *t < at_s);
+        let rows = place(from_s)..place(from_s + length_s);
         if let Some(envelope) = least_squares(carrier, &rows, frequency_hz) {
             out.push(Window { t_s: from_s + 0.5 * length_s, envelope, rows });
         }
@@ -202,6 +211,18 @@ mod tests {
         let jitter = |i: i32| 0.04 * f64::from(i) + 0.012 * (f64::from(i) * 12.9898).sin();
         let (t, x, y, orbit) = carrier((0..3000).map(jitter), 0.36);
         same_orbit(&demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36), &orbit, 1e-9);
+    }
+
+    #[test]
+    fn a_short_film_of_few_frames_has_windows_enough() {
+        let (t, x, y, orbit) = carrier((0..4500).map(|i| f64::from(i) * 0.04), 0.36);
+        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36);
+        assert!(windows.len() > 100, "{}", windows.len());
+        same_orbit(&windows, &orbit, 1e-9);
+        let (t, x, y, orbit) = carrier((0..7200).map(|i| f64::from(i) * 0.2), 0.36);
+        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36);
+        assert!(windows.len() > 200, "{}", windows.len());
+        same_orbit(&windows, &orbit, 1e-9);
     }
 
     #[test]

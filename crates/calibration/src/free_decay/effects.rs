@@ -3,7 +3,7 @@
 use cvg_model::effects::EffectId;
 
 use super::fit::Fit;
-use super::model::Term;
+use super::model::{OFFSETS, Term};
 use super::report::{Finding, estimate, shown, whole, whole_raw};
 use super::runs::DecayRun;
 use super::selection::{Added, BELIEVED, is_declared, one_rate};
@@ -17,6 +17,9 @@ const SPRING: &str = "spring-isotropic";
 /// Damping that grows with the square of the amplitude; of no effect of the library.
 const DAMPING_GROWTH: &str = "damping-nonlinear";
 
+/// What the offsets of x_c, x_s, y_c and y_s are called: those in phase as the library has them.
+const OFFSET_NAMES: [&str; 4] = ["offset_x", "offset_x_quadrature", "offset_y", "offset_y_quadrature"];
+
 /// The effect that a term stands for.
 pub(crate) fn name(term: Term) -> &'static str {
     match term {
@@ -29,6 +32,9 @@ pub(crate) fn name(term: Term) -> &'static str {
         Term::GainRatio => EffectId::DetectionGainMismatch.description().id,
         Term::Skew => EffectId::DetectionSkew.description().id,
         Term::Phase => EffectId::DetectionPhase.description().id,
+        Term::ReadoutCubic => EffectId::DetectionCubic.description().id,
+        Term::OffsetXc | Term::OffsetXs | Term::OffsetYc | Term::OffsetYs => EffectId::DetectionOffset.description().id,
+        Term::SpringFourCos | Term::SpringFourSin => EffectId::SpringCubic.description().id,
     }
 }
 
@@ -55,12 +61,26 @@ pub(crate) fn effects(finding: &Finding, runs: &[DecayRun]) -> Vec<EffectReport>
         let parameter = &EffectId::DetectionGainMismatch.description().parameters[0];
         out.push(plain(finding, Term::GainRatio, vec![entry(parameter.name, parameter.unit, ratio)], runs));
     }
-    for (term, id) in [(Term::Skew, EffectId::DetectionSkew), (Term::Phase, EffectId::DetectionPhase)] {
+    let alone = [
+        (Term::Skew, EffectId::DetectionSkew),
+        (Term::Phase, EffectId::DetectionPhase),
+        (Term::ReadoutCubic, EffectId::DetectionCubic),
+    ];
+    for (term, id) in alone {
         if model.has(term) {
             let parameter = &id.description().parameters[0];
             let value = entry(parameter.name, parameter.unit, estimate(fit, term));
             out.push(plain(finding, term, vec![value], runs));
         }
+    }
+    if model.has(OFFSETS[0]) {
+        let named = OFFSETS.iter().zip(OFFSET_NAMES);
+        let parameters = named.map(|(term, name)| entry(name, "V", estimate(fit, *term))).collect();
+        out.push(plain(finding, OFFSETS[0], parameters, runs));
+    }
+    if model.has(Term::SpringFourCos) {
+        let parameters = polar_entries(fit, EffectId::SpringCubic, [Term::SpringFourCos, Term::SpringFourSin], 0.0);
+        out.push(plain(finding, Term::SpringFourCos, parameters, runs));
     }
     if model.has(Term::Spring) {
         let mut parameters = vec![entry("c", "rad/s/V^2", estimate(fit, Term::Spring))];
@@ -80,8 +100,8 @@ fn entry(name: &str, unit: &str, e: Estimate) -> ParameterReport {
     ParameterReport { name: name.into(), unit: unit.into(), value: e.value, ci95: Some(e.ci95) }
 }
 
-/// Both components of an anisotropy, as magnitude and axis.
-fn anisotropy(fit: &Fit, id: EffectId, [along, across]: [Term; 2]) -> EffectReport {
+/// Both components of an effect, as magnitude and angle, for components along an axis at `axis_rad`.
+fn polar_entries(fit: &Fit, id: EffectId, [along, across]: [Term; 2], axis_rad: f64) -> Vec<ParameterReport> {
     let at = |term: Term| fit.model.terms.iter().position(|t| *t == term);
     let (a, b) = (fit.model.value(along), fit.model.value(across));
     let (va, vb, vab) = match (at(along), at(across)) {
@@ -90,11 +110,16 @@ fn anisotropy(fit: &Fit, id: EffectId, [along, across]: [Term; 2]) -> EffectRepo
     };
     let (magnitude, unit, angle, division) = shown(id).unwrap_or(("magnitude", "1/s", "axis", 2.0));
     let (size, axis) = polar([a, b], (va, vb, vab), division);
-    let turned = wrapped(axis.value + fit.model.axis_rad.to_degrees(), 360.0 / division) - axis.value;
+    let turned = wrapped(axis.value + axis_rad.to_degrees(), 360.0 / division) - axis.value;
+    vec![entry(magnitude, unit, size), entry(angle, "deg", axis.turned(turned))]
+}
+
+/// Both components of an anisotropy, as magnitude and axis.
+fn anisotropy(fit: &Fit, id: EffectId, terms: [Term; 2]) -> EffectReport {
     EffectReport {
         id: id.description().id.into(),
         origin: Origin::Declared,
-        parameters: vec![entry(magnitude, unit, size), entry(angle, "deg", axis.turned(turned))],
+        parameters: polar_entries(fit, id, terms, fit.model.axis_rad),
         heldout_rms_deg: None,
         evidence: "declared; from the equation of motion, fitted to E, Q and θ of all decays at once".into(),
         confounded_with: Vec::new(),
@@ -129,6 +154,9 @@ fn plain(finding: &Finding, term: Term, parameters: Vec<ParameterReport>, runs: 
     let scaling = match term {
         Term::Spring => "precession in proportion to quadrature as the decays go down",
         Term::DampingGrowth => "damping in proportion to energy as the decays go down",
+        Term::SpringFourCos => "precession that follows four times the pattern's angle, of any amplitude",
+        Term::ReadoutCubic => "(E, R, S, Q) of all angles as this readout maps them while the decays go down",
+        Term::OffsetXc => "what stays in the channels while the phase and the pattern turn and the decays go down",
         _ => "(E, R, S, Q) of all angles as this readout maps them",
     };
     let evidence = format!(

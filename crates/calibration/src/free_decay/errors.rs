@@ -32,7 +32,7 @@ fn told(part: &Part<'_>) -> Vec<usize> {
 fn residual(part: &Part<'_>, at: &[usize], angle_of: impl Fn(usize) -> f64) -> Residual {
     let run = part.run;
     let pi = std::f64::consts::PI;
-    let t0 = run.t_s[0];
+    let (t0, turned) = (run.t_s[0], run.turned_rad());
     let mut errors: Vec<f64> = at.iter().map(|&i| angle_of(i)).collect();
     for i in 1..errors.len() {
         errors[i] = errors[i - 1] + wrapped(errors[i] - errors[i - 1], pi);
@@ -47,7 +47,7 @@ fn residual(part: &Part<'_>, at: &[usize], angle_of: impl Fn(usize) -> f64) -> R
         t_s: at.iter().map(|&i| run.t_s[i]).collect(),
         // a line over time: the input turns evenly, or not at all
         turned: at.iter().map(|&i| run.t_s[i] - t0).collect(),
-        table: at.iter().map(|&i| run.rate_rad_s[i] * (run.t_s[i] - t0)).collect(),
+        table: at.iter().map(|&i| turned[i]).collect(),
         precession: vec![directions.last().zip(directions.first()).map_or(0.0, |(b, a)| b - a); at.len()],
         direction: directions,
         angle: errors,

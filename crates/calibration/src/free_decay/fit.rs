@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::model::{Model, Start, Term};
+use super::model::{Model, OFFSETS, Start, Term};
 use super::noise::Autoregression;
 use super::runs::DecayRun;
 use super::start::energy;
@@ -54,6 +54,14 @@ impl Fit {
     /// The same, with intervals that also hold a term that was not seen.
     pub(crate) fn beside(mut self, unseen: &Unseen) -> Self {
         self.covariance += &unseen.by * unseen.by.transpose() * (unseen.size * unseen.size);
+        self
+    }
+
+    /// The same, with intervals that also hold terms that were not seen, together.
+    pub(crate) fn beyond(mut self, beyond: &Beyond, bound: impl Fn(Term) -> f64) -> Self {
+        if let Some(held) = beyond.held(bound) {
+            self.covariance += held;
+        }
         self
     }
 
@@ -264,8 +272,10 @@ fn nudge(term: Term, run: &DecayRun, start: &Start) -> f64 {
     let duration = run.duration_s().max(f64::MIN_POSITIVE);
     match term {
         Term::Spring | Term::DampingGrowth => NUDGE / (duration * energy),
-        Term::GainRatio | Term::Skew | Term::Phase => NUDGE,
-        Term::AngularGain => NUDGE / (duration * run.mean_rate().abs().max(1e-9)),
+        Term::ReadoutCubic => NUDGE / energy,
+        t if OFFSETS.contains(&t) => NUDGE * energy.sqrt(),
+        t if t.is_readout() => NUDGE,
+        Term::AngularGain => NUDGE / (duration * run.usual_rate().max(1e-9)),
         _ => NUDGE / duration,
     }
 }
@@ -340,23 +350,74 @@ pub(crate) struct Unseen {
 
 /// A term that was not added, by one linearisation: its likelihood, and all values within `bound` as likely before.
 pub(crate) fn unseen(fitted: &Fit, term: Term, bound: f64, data: Data<'_>) -> Option<Unseen> {
-    let white = || Autoregression::white(1.0);
-    let mut fitting = Fitting { data, noise: [white(), white(), white()], aside: fitted.set_aside.clone() };
-    fitting.weigh(&fitted.model, &fitted.starts, true);
-    let shared = fitted.model.terms.len();
-    let (matrix, right) = fitting.equations(&fitted.model.with(term), &fitted.starts);
-    let rest = |i: usize| i + usize::from(i >= shared);
-    let n = matrix.nrows() - 1;
-    let of_rest = DMatrix::from_fn(n, n, |i, j| matrix[(rest(i), rest(j))]);
-    let along = DVector::from_fn(n, |i, _| matrix[(rest(i), shared)]);
-    // the values take up what of the term they can
-    let taken = solved(&of_rest, &along, 0.0)?;
-    let own = (matrix[(shared, shared)] - along.dot(&taken)).max(0.0);
-    let left = right[shared] - taken.dot(&DVector::from_fn(n, |i, _| right[rest(i)]));
+    let beyond = Beyond::of(fitted, &[term], data)?;
     // even between the bounds
-    let precision = own + 3.0 / (bound * bound);
-    let size = (left / precision).hypot(precision.sqrt().recip());
-    Some(Unseen { size, by: taken.rows(0, shared).into_owned() })
+    let precision = beyond.information[(0, 0)].max(0.0) + 3.0 / (bound * bound);
+    let size = (beyond.left[0] / precision).hypot(precision.sqrt().recip());
+    Some(Unseen { size, by: beyond.by.column(0).into_owned() })
+}
+
+/// What data say of terms that a fit does not have, all of them at once, after the fit took up what it can; linearised where
+/// they are absent.
+#[derive(Debug, Clone)]
+pub(crate) struct Beyond {
+    terms: Vec<Term>,
+    /// inverse covariance of the terms
+    information: DMatrix<f64>,
+    /// half the slope of 2 ln likelihood along each of them
+    left: DVector<f64>,
+    /// change of the values of the model's terms by a unit of each
+    by: DMatrix<f64>,
+}
+
+impl Beyond {
+    /// `None` where the fit itself is not determined.
+    pub(crate) fn of(fitted: &Fit, causes: &[Term], data: Data<'_>) -> Option<Self> {
+        let white = || Autoregression::white(1.0);
+        let mut fitting = Fitting { data, noise: [white(), white(), white()], aside: fitted.set_aside.clone() };
+        fitting.weigh(&fitted.model, &fitted.starts, true);
+        let shared = fitted.model.terms.len();
+        let model = causes.iter().fold(fitted.model.clone(), |m, cause| m.with(*cause));
+        let more = model.terms.len() - shared;
+        let (matrix, right) = fitting.equations(&model, &fitted.starts);
+        let rest = |i: usize| if i < shared { i } else { i + more };
+        let n = matrix.nrows() - more;
+        let of_rest = DMatrix::from_fn(n, n, |i, j| matrix[(rest(i), rest(j))]);
+        let right_of_rest = DVector::from_fn(n, |i, _| right[rest(i)]);
+        let (mut taken, mut along) = (DMatrix::zeros(n, more), DMatrix::zeros(n, more));
+        for k in 0..more {
+            let column = DVector::from_fn(n, |i, _| matrix[(rest(i), shared + k)]);
+            // the values take up what of the term they can
+            taken.set_column(k, &solved(&of_rest, &column, 0.0)?);
+            along.set_column(k, &column);
+        }
+        let own = matrix.view((shared, shared), (more, more)) - along.transpose() * &taken;
+        Some(Self {
+            terms: model.terms[shared..].to_vec(),
+            information: 0.5 * (&own + own.transpose()),
+            left: right.rows(shared, more) - taken.transpose() * right_of_rest,
+            by: taken.rows(0, shared).into_owned(),
+        })
+    }
+
+    /// What a cause would gain in 2 ln likelihood if it alone were added; as much as one can where nothing tells.
+    pub(crate) fn gain(&self, cause: Term) -> f64 {
+        let at: Vec<usize> = (0..self.terms.len()).filter(|&i| cause.cause().contains(&self.terms[i])).collect();
+        let own = DMatrix::from_fn(at.len(), at.len(), |i, j| self.information[(at[i], at[j])]);
+        let left = DVector::from_fn(at.len(), |i, _| self.left[at[i]]);
+        solved(&own, &left, 0.0).map_or(f64::INFINITY, |by| left.dot(&by))
+    }
+
+    /// Covariance that the terms give to the values of the fit, each as far as the data leave room for it, and all values
+    /// within its bound as likely before.
+    fn held(&self, bound: impl Fn(Term) -> f64) -> Option<DMatrix<f64>> {
+        let n = self.terms.len();
+        let prior = DMatrix::from_fn(n, n, |i, j| if i == j { 3.0 / bound(self.terms[i]).powi(2) } else { 0.0 });
+        let covariance = covariance(&(&self.information + prior), n);
+        let most_likely = &covariance * &self.left;
+        let square = covariance + &most_likely * most_likely.transpose();
+        Some(&self.by * square * self.by.transpose()).filter(|held| held.iter().all(|v| v.is_finite()))
+    }
 }
 
 /// Follows a model from the beginning of each run further and further on, so that what beats is never off by a cycle.

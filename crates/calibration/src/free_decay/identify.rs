@@ -6,9 +6,12 @@ use super::errors::{Part, after, raw};
 use super::fit::{Data, Fit, fit};
 use super::model::{Start, Term};
 use super::phase::phase;
-use super::report::{Errors, Finding, report};
+use super::report::{Errors, Finding, estimate, report};
 use super::runs::DecayRun;
-use super::selection::{Chosen, choose, instead, is_declared, is_sound, unseen_near_one_angle, unseen_phase};
+use super::selection::{
+    Chosen, beside_unseen_readout, choose, instead, is_declared, is_sound, one_rate, unseen_near_one_angle,
+    unseen_phase,
+};
 use crate::error::Refusal;
 use crate::identified::{Identification, Options};
 use crate::recording::{Campaign, RunKind};
@@ -132,16 +135,18 @@ pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bo
     };
     let mut final_fit = of_all(&chosen.discovered);
     sound(&final_fit, &head.device)?;
+    decays(&final_fit, &head.device)?;
     (options.progress)("fitting what explains the decays as well");
     let instead = instead(&chosen.added, &final_fit, all);
     // where a phase explains them as well by itself, what lies between is held by that
     let is_held = !chosen.many_angles || instead.iter().any(|other| other.by == Term::Phase);
-    let unseen = if is_held { None } else { unseen_phase(&final_fit, all) };
+    let unseen = if is_held || !one_rate(&fitted) { None } else { unseen_phase(&final_fit, all) };
     let phase = phase(&final_fit.model, &final_fit.starts, &fitted);
     let detuning = phase.as_ref().map_or(0.0, |p| p.per_energy.0.abs() + 2.0 * p.per_energy.1);
     let hidden = if chosen.many_angles { Vec::new() } else { unseen_near_one_angle(&final_fit, detuning, all) };
     final_fit = instead.iter().fold(final_fit, |f, other| f.or(&other.model));
     let seen = final_fit.clone();
+    final_fit = beside_unseen_readout(final_fit, chosen.many_angles, all);
     final_fit = unseen.iter().chain(&hidden).fold(final_fit, Fit::beside);
     let final_declared =
         if chosen.added.iter().all(|a| is_declared(a.term)) { final_fit.clone() } else { of_all(&chosen.declared) };
@@ -200,6 +205,19 @@ fn sound(fit: &Fit, device: &str) -> Result<(), Refusal> {
         device,
         "the equation of motion does not follow these decays",
         "decays without loops or forces, longer ones, or at several starting angles",
+    ))
+}
+
+/// Refuses what is not seen to decay: damping that may be nothing.
+fn decays(fit: &Fit, device: &str) -> Result<(), Refusal> {
+    let e = estimate(fit, Term::Damping);
+    if e.ci95[0] > 0.0 {
+        return Ok(());
+    }
+    Err(Refusal::no_answer(
+        device,
+        format!("these are no decays that are seen: 1/τ is {:.3e} ± {:.1e} 1/s", e.value, e.half_width()),
+        "decays without loops or forces, long enough that the amplitude falls, and of the carrier that decays",
     ))
 }
 

@@ -1,5 +1,6 @@
 //! A resonator that rings freely, as it is believed to be: which terms its equations have, and what a run then shows.
 
+use cvg_model::effects::{EffectId, Moment};
 use nalgebra::Matrix4;
 
 use super::runs::DecayRun;
@@ -32,12 +33,50 @@ pub(crate) enum Term {
     Skew,
     /// φ_y − φ_x between the channels, rad: of one that is sampled later than the other
     Phase,
+    /// κ of X(1 + ¾κ|X|²), Y likewise, 1/V²
+    ReadoutCubic,
+    /// what the demodulator adds to x_c, V
+    OffsetXc,
+    /// to x_s
+    OffsetXs,
+    /// to y_c
+    OffsetYc,
+    /// to y_s
+    OffsetYs,
+    /// p cos φ of θ̇ = p sin(4θ + φ), rad/s
+    SpringFourCos,
+    /// p sin φ of it
+    SpringFourSin,
 }
+
+/// What a demodulator adds to its outputs.
+pub(crate) const OFFSETS: [Term; 4] = [Term::OffsetXc, Term::OffsetXs, Term::OffsetYc, Term::OffsetYs];
 
 impl Term {
     /// Whether it is of the readout: what the channels make of the orbit, and nothing of its motion.
     pub(crate) fn is_readout(self) -> bool {
-        matches!(self, Self::GainRatio | Self::Skew | Self::Phase)
+        matches!(self, Self::GainRatio | Self::Skew | Self::Phase | Self::ReadoutCubic) || OFFSETS.contains(&self)
+    }
+
+    /// The terms that come and go with it, which one cause makes: itself first.
+    pub(crate) fn cause(self) -> &'static [Self] {
+        match self {
+            Self::Damping => &[Self::Damping],
+            Self::DampingAlong => &[Self::DampingAlong],
+            Self::DampingAcross => &[Self::DampingAcross],
+            Self::SplitAlong => &[Self::SplitAlong],
+            Self::SplitAcross => &[Self::SplitAcross],
+            Self::AngularGain => &[Self::AngularGain],
+            Self::Precession => &[Self::Precession],
+            Self::Spring => &[Self::Spring],
+            Self::DampingGrowth => &[Self::DampingGrowth],
+            Self::GainRatio => &[Self::GainRatio],
+            Self::Skew => &[Self::Skew],
+            Self::Phase => &[Self::Phase],
+            Self::ReadoutCubic => &[Self::ReadoutCubic],
+            Self::OffsetXc | Self::OffsetXs | Self::OffsetYc | Self::OffsetYs => &OFFSETS,
+            Self::SpringFourCos | Self::SpringFourSin => &[Self::SpringFourCos, Self::SpringFourSin],
+        }
     }
 }
 
@@ -58,21 +97,24 @@ impl Model {
         Self { values: vec![0.0; terms.len()], terms, axis_rad }
     }
 
-    /// The same with a term more, absent yet.
-    pub(crate) fn with(&self, term: Term) -> Self {
+    /// The same with a cause more, whose terms are absent yet; at the end.
+    pub(crate) fn with(&self, cause: Term) -> Self {
         let mut more = self.clone();
-        more.terms.push(term);
-        more.values.push(0.0);
+        more.terms.extend(cause.cause());
+        more.values.resize(more.terms.len(), 0.0);
         more
     }
 
-    /// The same with another term in the place of one, absent yet; at the end, as a term that is added.
-    pub(crate) fn exchanged(&self, term: Term, other: Term) -> Self {
-        let mut rest = self.clone();
-        let kept = || self.terms.iter().zip(&self.values).filter(|(t, _)| **t != term);
-        rest.terms = kept().map(|(t, _)| *t).collect();
-        rest.values = kept().map(|(_, v)| *v).collect();
-        rest.with(other)
+    /// The same without a cause.
+    pub(crate) fn without(&self, cause: Term) -> Self {
+        let kept = || self.terms.iter().zip(&self.values).filter(|(t, _)| !cause.cause().contains(t));
+        let (terms, values) = kept().map(|(t, v)| (*t, *v)).unzip();
+        Self { terms, values, axis_rad: self.axis_rad }
+    }
+
+    /// The same with another cause in the place of one, absent yet; at the end, as one that is added.
+    pub(crate) fn exchanged(&self, cause: Term, other: Term) -> Self {
+        self.without(cause).with(other)
     }
 
     pub(crate) fn has(&self, term: Term) -> bool {
@@ -103,21 +145,49 @@ impl Model {
             precession_rad_s: self.precession(rate_rad_s),
             spring: self.value(Term::Spring),
             damping_growth: self.value(Term::DampingGrowth),
+            spring_four: [self.value(Term::SpringFourCos), self.value(Term::SpringFourSin)],
+        }
+    }
+
+    /// The vibration behind the readout of an envelope, of which so much of an offset is left.
+    pub(crate) fn unread(&self, seen: &cvg_model::Envelope<f64>, of_offset: f64) -> cvg_model::Envelope<f64> {
+        let [x_c, x_s, y_c, y_s] = OFFSETS.map(|t| self.value(t));
+        let now = Moment::default();
+        let alone = |value: f64| [value, 0.0, 0.0, 0.0];
+        let e = *seen - cvg_model::Envelope::new(x_c, x_s, y_c, y_s) * of_offset;
+        let e = EffectId::DetectionPhase.unread(&alone(self.value(Term::Phase)), e, &now);
+        let e = EffectId::DetectionGainMismatch.unread(&alone(1.0 + self.value(Term::GainRatio)), e, &now);
+        let e = EffectId::DetectionSkew.unread(&alone(self.value(Term::Skew)), e, &now);
+        EffectId::DetectionCubic.unread(&alone(self.value(Term::ReadoutCubic)), e, &now)
+    }
+
+    /// What the channels make of the mean of a stretch.
+    fn readout(&self, run: &DecayRun) -> impl Fn(usize, State) -> State {
+        let linear = [Term::GainRatio, Term::Skew, Term::Phase].iter().any(|t| self.has(*t)).then(|| {
+            stokes::readout(1.0 + self.value(Term::GainRatio), self.value(Term::Skew), self.value(Term::Phase))
+        });
+        let kappa = self.value(Term::ReadoutCubic);
+        let [x_c, x_s, y_c, y_s] = OFFSETS.map(|t| self.value(t));
+        let offset = cvg_model::Envelope::new(x_c, x_s, y_c, y_s);
+        let is_offset = self.has(OFFSETS[0]);
+        move |i, mean| {
+            let bent = if kappa == 0.0 { mean } else { stokes::cubed(kappa, &mean) };
+            let read = linear.map_or(bent, |m| m * bent);
+            // U(Z + o) − U(Z), by what was seen of Z + o, whose phase U does not have
+            if is_offset { read + stokes::of(&run.means[i]) - stokes::of(&(run.means[i] - offset)) } else { read }
         }
     }
 
     /// What the first `count` samples of a run show if it began so. Linear mechanics exactly, nonlinear ones in between
     /// (Strang), which is exact as far as they commute: to 2e-4 of themselves where either turns the orbit by 2° a sample.
     pub(crate) fn predict(&self, run: &DecayRun, start: &Start, count: usize) -> Vec<State> {
-        let readout = self.terms.iter().any(|t| t.is_readout()).then(|| {
-            stokes::readout(1.0 + self.value(Term::GainRatio), self.value(Term::Skew), self.value(Term::Phase))
-        });
+        let readout = self.readout(run);
         let mut step: Option<Step> = None;
         let mut u = pure(start);
         let mut out = Vec::with_capacity(count);
         for i in 0..count.min(run.len()) {
             let dt_s = if i == 0 { 0.0 } else { run.t_s[i] - run.t_s[i - 1] };
-            let rate = run.rate_rad_s[i];
+            let rate = run.step_rate_rad_s[i];
             let now = match step.take() {
                 Some(s) if s.serves(dt_s, rate) || (i == 0) => s,
                 _ => Step::new(self.mechanics(rate), rate, dt_s, run.span_s),
@@ -126,8 +196,7 @@ impl Model {
                 let half = now.mechanics.nonlinear(&u, 0.5 * dt_s);
                 u = now.mechanics.nonlinear(&(now.over * half), 0.5 * dt_s);
             }
-            let mean = now.mean * u;
-            out.push(readout.map_or(mean, |m| m * mean));
+            out.push(readout(i, now.mean * u));
             step = Some(now);
         }
         out
@@ -145,7 +214,7 @@ impl Model {
         let mut out = Vec::with_capacity(run.len());
         for i in 0..run.len() {
             if i > 0 {
-                let (dt_s, m) = (run.t_s[i] - run.t_s[i - 1], self.mechanics(run.rate_rad_s[i]));
+                let (dt_s, m) = (run.t_s[i] - run.t_s[i - 1], self.mechanics(run.step_rate_rad_s[i]));
                 let half = turned(&m, &z, 0.5 * dt_s);
                 z = turned(&m, &((m.envelope_generator() * dt_s).exp() * half), 0.5 * dt_s);
             }
@@ -155,13 +224,13 @@ impl Model {
     }
 }
 
-/// An envelope turned by the precession cQ.
+/// An envelope turned by what the nonlinear springs precess it.
 fn turned(m: &Mechanics, z: &State, dt_s: f64) -> State {
-    if m.spring == 0.0 {
+    if !m.precesses() {
         return *z;
     }
     let e = cvg_model::Envelope::new(z[0], z[1], z[2], z[3]);
-    let (sin, cos) = (m.spring * e.pendulum().q * dt_s).sin_cos();
+    let (sin, cos) = m.turned(&stokes::of(&e), dt_s).sin_cos();
     let e = e.turned(sin, cos);
     State::new(e.x_c, e.x_s, e.y_c, e.y_s)
 }

@@ -10,6 +10,7 @@ use super::model::{Model, Start};
 use super::noise::Autoregression;
 use super::runs::{DecayRun, overlap};
 use super::start::energy;
+use super::stokes::State;
 use cvg_model::Envelope;
 
 /// What the phases tell.
@@ -33,9 +34,14 @@ fn columns(model: &Model, start: &Start, run: &DecayRun) -> [Vec<f64>; 5] {
     let middle = 0.5 * (run.t_s[0] + run.t_s[run.len() - 1]);
     let mut out = [(); 5].map(|()| Vec::with_capacity(run.len()));
     let (mut phase, mut last, mut grown) = (0.0, 0.0, 0.0);
+    // the energy of the vibration itself, as c has it: not as unequal gains read it
+    let energies: Vec<f64> = predicted.iter().map(State::norm_squared).collect();
     for (i, p) in predicted.iter().enumerate() {
         let (seen, rate) = &run.envelopes[i];
-        let (cos, sin) = overlap(&Envelope::new(p[0], p[1], p[2], p[3]), seen);
+        // an offset stays while the rest of the stretch is brought to its middle
+        let half = 0.5 * rate * run.span_s;
+        let of_offset = if half == 0.0 { 1.0 } else { half.sin() / half };
+        let (cos, sin) = overlap(&Envelope::new(p[0], p[1], p[2], p[3]), &model.unread(seen, of_offset));
         let now = sin.atan2(cos);
         if i == 0 {
             phase = now;
@@ -43,7 +49,7 @@ fn columns(model: &Model, start: &Start, run: &DecayRun) -> [Vec<f64>; 5] {
             let dt = run.t_s[i] - run.t_s[i - 1];
             let expected = 0.5 * (rate + run.envelopes[i - 1].1) * dt;
             phase += expected + crate::numerics::angles::wrapped(now - last - expected, std::f64::consts::TAU);
-            grown += 0.5 * (energy(&run.seen[i]) + energy(&run.seen[i - 1])) * dt;
+            grown += 0.5 * (energies[i] + energies[i - 1]) * dt;
         }
         last = now;
         let (a, t) = (energy(&run.seen[i]).sqrt(), (run.t_s[i] - middle) / run.duration_s());

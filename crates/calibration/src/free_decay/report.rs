@@ -6,10 +6,10 @@ use super::effects::{effects, name};
 use super::errors::{Part, after, in_volts, raw};
 use super::fit::{Fit, Unseen};
 use super::identify::Head;
-use super::model::Term;
+use super::model::{OFFSETS, Term};
 use super::phase::Phase;
 use super::runs::DecayRun;
-use super::selection::{Chosen, Instead, one_rate};
+use super::selection::{BELIEVED_GAIN, BELIEVED_PHASE_RAD, Chosen, Instead, one_rate};
 use crate::diagnostics::evaluate::Evaluation;
 use crate::diagnostics::plots::plots_of;
 use crate::diagnostics::residual::{
@@ -255,7 +255,21 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
         out.push(format!("{}: the input rate is not stated, and is taken as zero", run.name));
     }
     if finding.chosen.many_angles && !finding.fit.model.has(Term::GainRatio) {
-        out.push("the campaign cannot tell the detection gain ratio: the decays show no sign of unequal gains".into());
+        let why = if one_rate(fitted) {
+            "at one rate unequal gains pass for anisodamping, but for a trace that is not seen"
+        } else {
+            "the decays show no sign of unequal gains"
+        };
+        out.push(format!("the campaign cannot tell the detection gain ratio: {why}"));
+    }
+    if finding.chosen.many_angles && one_rate(fitted) {
+        out.push(format!(
+            "all decays are at one rate, where what a readout does to the orbit passes for other mechanics: the intervals hold \
+             gains and axes that are {:.1} % off and a phase of {:.0} mrad between the channels, of which only one trace is seen; \
+             decays at another rate would tell them",
+            100.0 * BELIEVED_GAIN,
+            BELIEVED_PHASE_RAD / MRAD
+        ));
     }
     out.push("a free decay has no drive: there is no actuation gain ratio".into());
     if held.is_empty() {
@@ -318,6 +332,17 @@ fn hypothesis(finding: &Finding, head: &Head) -> Hypothesis {
     if model.has(Term::GainRatio) {
         let g = 1.0 + model.value(Term::GainRatio);
         add(EffectId::DetectionGainMismatch, [g, 0.0, 0.0, 0.0], Origin::Declared);
+    }
+    if model.has(Term::ReadoutCubic) {
+        add(EffectId::DetectionCubic, [model.value(Term::ReadoutCubic), 0.0, 0.0, 0.0], Origin::Discovered);
+    }
+    if model.has(OFFSETS[0]) {
+        let [x, y] = [Term::OffsetXc, Term::OffsetYc].map(|t| model.value(t));
+        add(EffectId::DetectionOffset, [x, y, 0.0, 0.0], Origin::Discovered);
+    }
+    if model.has(Term::SpringFourCos) {
+        let [cos, sin] = m.spring_four;
+        add(EffectId::SpringCubic, [cos, sin, 0.0, 0.0], Origin::Discovered);
     }
     h.members.sort_by_key(|m| m.id);
     h

@@ -46,7 +46,7 @@ fn slope(model: &Model, at: usize, run: &DecayRun, i: usize) -> State {
     let m = unit.mechanics(run.rate_rad_s[i]);
     let mut u = run.seen[i];
     u[0] = energy(&u);
-    let turning = Mechanics { precession_rad_s: m.precession_rad_s + m.spring * u[3], ..m };
+    let turning = Mechanics { precession_rad_s: m.precession_rad_s + m.precession_of_springs(&u), ..m };
     turning.generator() * u - u * (2.0 * m.damping_growth * u[0])
 }
 

@@ -27,6 +27,8 @@ pub(crate) struct Mechanics {
     pub(crate) spring: f64,
     /// ȧ = −γa³ beside the linear damping, 1/s/V²
     pub(crate) damping_growth: f64,
+    /// θ̇ = p sin(4θ + φ), as (p cos φ, p sin φ), rad/s
+    pub(crate) spring_four: [f64; 2],
 }
 
 /// The variables of a pendulum as a vector.
@@ -85,18 +87,48 @@ impl Mechanics {
         Matrix4::from_columns(&[unit(0), unit(1), unit(2), unit(3)])
     }
 
-    /// The nonlinear part alone over `dt_s`, exactly: precession by cQ holds E and Q, damping by γE holds the orbit's shape.
+    /// Whether a nonlinear spring precesses the orbit.
+    pub(crate) fn precesses(&self) -> bool {
+        self.spring != 0.0 || self.spring_four != [0.0, 0.0]
+    }
+
+    /// θ̇ of the nonlinear springs, rad/s. A circle has no orientation that the fourth harmonic could follow.
+    pub(crate) fn precession_of_springs(&self, u: &State) -> f64 {
+        let ([cos, sin], line) = (self.spring_four, u[1] * u[1] + u[2] * u[2]);
+        // sin 4θ = 2RS/(R² + S²), cos 4θ = (R² − S²)/(R² + S²)
+        let four = if line > 0.0 { (2.0 * cos * u[1] * u[2] + sin * (u[1] * u[1] - u[2] * u[2])) / line } else { 0.0 };
+        self.spring * u[3] + four
+    }
+
+    /// What the nonlinear springs turn the orbit in `dt_s`, rad: by the rate half way, which errs by (p·dt)³.
+    pub(crate) fn turned(&self, u: &State, dt_s: f64) -> f64 {
+        let first = self.precession_of_springs(u) * dt_s;
+        if self.spring_four == [0.0, 0.0] { first } else { self.precession_of_springs(&rotated(u, 0.5 * first)) * dt_s }
+    }
+
+    /// The nonlinear part alone over `dt_s`: precession holds E and Q, damping by γE holds the orbit's shape.
     pub(crate) fn nonlinear(&self, u: &State, dt_s: f64) -> State {
-        let mut out = *u;
-        if self.spring != 0.0 {
-            let (sin, cos) = (2.0 * self.spring * u[3] * dt_s).sin_cos();
-            (out[1], out[2]) = (u[1] * cos - u[2] * sin, u[2] * cos + u[1] * sin);
-        }
+        let mut out = if self.precesses() { rotated(u, self.turned(u, dt_s)) } else { *u };
         if self.damping_growth != 0.0 {
             out /= (1.0 + 2.0 * self.damping_growth * u[0] * dt_s).max(f64::MIN_POSITIVE);
         }
         out
     }
+}
+
+/// The state of an orbit whose pattern is turned by an angle, rad.
+fn rotated(u: &State, angle: f64) -> State {
+    let (sin, cos) = (2.0 * angle).sin_cos();
+    State::new(u[0], u[1] * cos - u[2] * sin, u[2] * cos + u[1] * sin, u[3])
+}
+
+/// What a cubic readout X(1 + ¾κ|X|²) of both channels makes of a state: |X|² = (E + R)/2, |Y|² = (E − R)/2, and S and Q go
+/// with the product of both channels.
+pub(crate) fn cubed(kappa: f64, u: &State) -> State {
+    let [x2, y2] = [0.5 * (u[0] + u[1]), 0.5 * (u[0] - u[1])];
+    let [gain_x, gain_y] = [x2, y2].map(|square| 1.0 + 0.75 * kappa * square);
+    let [x2, y2] = [x2 * gain_x * gain_x, y2 * gain_y * gain_y];
+    State::new(x2 + y2, x2 - y2, u[2] * gain_x * gain_y, u[3] * gain_x * gain_y)
 }
 
 /// What unequal gains, an oblique axis and a phase between the channels make of (E, R, S, Q).
@@ -137,6 +169,7 @@ mod tests {
         precession_rad_s: 0.4,
         spring: 0.03,
         damping_growth: 0.02,
+        spring_four: [0.0; 2],
     };
 
     #[test]
@@ -162,6 +195,29 @@ mod tests {
         let theta_dot = (u[1] * d[2] - u[2] * d[1]) / (2.0 * (u[1] * u[1] + u[2] * u[2]));
         assert!((theta_dot - M.spring * u[3]).abs() < 1e-6, "{theta_dot}");
         assert!((d[0] + 2.0 * M.damping_growth * u[0] * u[0]).abs() < 1e-5, "{}", d[0]);
+    }
+
+    #[test]
+    fn a_spring_that_goes_with_four_times_the_angle_precesses_as_the_librarys() {
+        let (e, p) = (Envelope::new(0.8, 0.1, -0.3, 0.2), [0.03, -0.02, 0.0, 0.0]);
+        let m = Mechanics { spring: 0.0, spring_four: [p[0], p[1]], ..M };
+        let rate = e.pendulum_rate(&EffectId::SpringCubic.mechanics(&p, &e));
+        let u = of(&e);
+        let theta_dot = (u[1] * rate.s - u[2] * rate.r) / (2.0 * (u[1] * u[1] + u[2] * u[2]));
+        assert!((m.precession_of_springs(&u) - theta_dot).abs() < 1e-12);
+        // one long step, as a hundred short ones
+        let mut slow = u;
+        for _ in 0..100 {
+            slow = rotated(&slow, m.turned(&slow, 0.01));
+        }
+        assert!((rotated(&u, m.turned(&u, 1.0)) - slow).norm() < 2e-5);
+    }
+
+    #[test]
+    fn a_cubic_readout_acts_on_states_as_on_envelopes() {
+        let e = Envelope::new(0.3, -0.2, 0.7, 0.4);
+        let read = EffectId::DetectionCubic.read(&[0.05, 0.0, 0.0, 0.0], e, &Moment::default());
+        assert!((cubed(0.05, &of(&e)) - of(&read)).norm() < 1e-12);
     }
 
     #[test]

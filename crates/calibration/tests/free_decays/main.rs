@@ -4,6 +4,7 @@
 mod broken;
 mod foucault;
 mod late;
+mod readouts;
 mod ring;
 
 use cvg_calibration::recording::Campaign;

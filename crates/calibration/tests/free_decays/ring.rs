@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cvg_model::Envelope;
+use cvg_model::effects::EffectId;
 use cvg_model::resonator::envelope::{detuning, precession};
 use cvg_model::resonator::{Anisotropy, Resonator};
 
@@ -40,6 +41,10 @@ pub(crate) struct Ring {
     /// ω_r − ω is less by this times E
     pub(crate) frequency_per_energy: f64,
     pub(crate) ahead_rad_s: f64,
+    /// θ̇ += p sin(4θ + φ), as (p cos φ, p sin φ)
+    pub(crate) spring_four: [f64; 2],
+    /// the rate grows evenly from nothing, and is reached at the end
+    pub(crate) speeds_up: bool,
     /// G_Dy/G_Dx
     pub(crate) gain_ratio: f64,
     /// phase that Y lags X by, rad: of a channel that is sampled late
@@ -67,6 +72,8 @@ impl Ring {
             spring: 0.0,
             frequency_per_energy: 0.0,
             ahead_rad_s: 0.3,
+            spring_four: [0.0; 2],
+            speeds_up: false,
             gain_ratio: 1.0,
             phase_rad: 0.0,
             noise_v: 1e-3,
@@ -76,9 +83,17 @@ impl Ring {
         }
     }
 
-    fn rate_of_change(&self, e: &Envelope<f64>) -> Envelope<f64> {
+    /// The time of the end, s.
+    pub(crate) fn end_s(&self) -> f64 {
+        self.rows as f64 * self.row_s
+    }
+
+    fn rate_of_change(&self, t: f64, e: &Envelope<f64>) -> Envelope<f64> {
         let p = e.pendulum();
-        self.resonator.envelope_rate(e, self.rate_dps.to_radians(), self.ahead_rad_s)
+        let share = if self.speeds_up { t / self.end_s() } else { 1.0 };
+        let [cos, sin] = self.spring_four;
+        self.resonator.envelope_rate(e, share * self.rate_dps.to_radians(), self.ahead_rad_s)
+            + EffectId::SpringCubic.mechanics(&[cos, sin, 0.0, 0.0], e)
             + precession(self.spring * p.q, e)
             + detuning(self.frequency_per_energy * p.e, e)
     }
@@ -91,8 +106,9 @@ impl Ring {
         (0..self.rows)
             .map(|i| {
                 if i > 0 {
-                    for _ in 0..4 {
-                        e = self.stepped(&e, 0.25 * self.row_s);
+                    for quarter in 0..4 {
+                        let t = ((i - 1) as f64 + 0.25 * f64::from(quarter)) * self.row_s;
+                        e = self.stepped(t, &e, 0.25 * self.row_s);
                     }
                 }
                 let own = (1.0 - self.memory * self.memory).sqrt() * self.noise_v;
@@ -107,11 +123,11 @@ impl Ring {
     }
 
     /// Runge and Kutta's fourth order.
-    fn stepped(&self, e: &Envelope<f64>, h: f64) -> Envelope<f64> {
-        let k1 = self.rate_of_change(e);
-        let k2 = self.rate_of_change(&(*e + k1 * (0.5 * h)));
-        let k3 = self.rate_of_change(&(*e + k2 * (0.5 * h)));
-        let k4 = self.rate_of_change(&(*e + k3 * h));
+    fn stepped(&self, t: f64, e: &Envelope<f64>, h: f64) -> Envelope<f64> {
+        let k1 = self.rate_of_change(t, e);
+        let k2 = self.rate_of_change(t + 0.5 * h, &(*e + k1 * (0.5 * h)));
+        let k3 = self.rate_of_change(t + 0.5 * h, &(*e + k2 * (0.5 * h)));
+        let k4 = self.rate_of_change(t + h, &(*e + k3 * h));
         *e + (k1 + k2 * 2.0 + k3 * 2.0 + k4) * (h / 6.0)
     }
 
