@@ -306,12 +306,19 @@ fn a_run_in_few_directions_is_of_the_sensor_whose_ellipse_it_lies_on() {
 /// one that did.
 #[test]
 fn a_held_out_run_in_which_the_angle_does_not_follow_is_no_test() {
+    let turned = |rate_dps: f64, gain: f64, seed: u64| {
+        let mut noise = Noise::new(seed);
+        let t_s: Vec<f64> = (0..4000).map(|i| 0.005 * f64::from(i)).collect();
+        let table: Vec<f64> = t_s.iter().map(|t| rate_dps * t).collect();
+        let mut read = |a: &f64| gain * (a + 0.5 * a.to_radians().sin()) + 0.02 * noise.sample();
+        let theta = table.iter().map(&mut read).collect();
+        Recording { t_s, table_deg: Some(table), theta_deg: Some(theta), ..Recording::default() }
+    };
     let campaign = |gains: &[f64]| {
         let held = |(at, gain): (usize, &f64)| {
-            let recording = recorded(BUILT, 18.0, *gain, 10 + at as u64);
-            run(&format!("held-{at}.csv"), Role::Holdout, recording)
+            run(&format!("held-{at}.csv"), Role::Holdout, turned(18.0, *gain, 10 + at as u64))
         };
-        let mut runs = vec![run("fit.csv", Role::Fit, recorded(BUILT, 37.0, 1.0, 1))];
+        let mut runs = vec![run("fit.csv", Role::Fit, turned(37.0, 1.0, 1))];
         runs.extend(gains.iter().enumerate().map(held));
         Campaign { angular_gain: Some(1.0), ..sensor(runs) }
     };

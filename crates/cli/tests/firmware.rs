@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use support::{Bench, Sheet, cvg, cvg_ok};
+use support::{Sheet, cvg, cvg_ok};
 use tempfile::TempDir;
 
 /// An encoder in counts with offset, gain, skew and cubic, and a fourth harmonic of the angle of 0.4° beside a reference.

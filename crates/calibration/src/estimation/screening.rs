@@ -287,19 +287,7 @@ impl Screen {
             Err(Refusal::no_answer(&track.name, only(&motion), "at least half a turn (180°)"))
         };
         let mut ready = self.ready(moving.into_iter().map(far_enough).collect(), |(track, _)| track, warnings)?;
-        let holds_out = |(track, _): &(Track, Motion)| track.samples(Role::Holdout) > 0;
-        if !ready.iter().any(holds_out) {
-            for (track, moves) in &mut ready {
-                track.hold_out_the_end();
-                *moves = motion(track, start, guess)?;
-            }
-            // of a few rows the last quarter was held out before, and is none
-            if ready.iter().any(holds_out) {
-                warnings.push(
-                    "no run that was to be held out is left: the last quarter of each of the others is held out".into(),
-                );
-            }
-        }
+        warnings.extend(hold_out_something(&mut ready, start, guess)?);
         Ok(ready)
     }
 
@@ -436,4 +424,23 @@ fn cut_at_slips(
     ));
     track.cut(&found.iter().map(|f| f.0).collect::<Vec<_>>());
     Ok(true)
+}
+
+/// Holds out the last quarter of each run where nothing is held out, and says so.
+fn hold_out_something(
+    runs: &mut [(Track, Motion)],
+    start: &Hypothesis,
+    guess: Guess,
+) -> Result<Option<String>, Refusal> {
+    let holds_out = |(track, _): &(Track, Motion)| track.samples(Role::Holdout) > 0;
+    if runs.iter().any(holds_out) {
+        return Ok(None);
+    }
+    for (track, moves) in runs.iter_mut() {
+        track.hold_out_the_end();
+        *moves = motion(track, start, guess)?;
+    }
+    // of a few rows the last quarter was held out before, and is none
+    let said = "no run that was to be held out is left: the last quarter of each of the others is held out";
+    Ok(runs.iter().any(holds_out).then(|| said.to_owned()))
 }
