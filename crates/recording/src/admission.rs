@@ -103,9 +103,9 @@ fn convert(
             if !is_readout(channel) {
                 let taken = units::of_channel(naming.wanted(channel));
                 warnings.push(format!("`{channel}`: {unit} is no unit that is known; it is taken for {taken}"));
-            } else if !units::is_count(unit) && in_brackets.windows(2).all(|pair| pair[0] == pair[1]) {
+            } else if in_brackets.windows(2).all(|pair| pair[0] == pair[1]) {
                 warnings.push(format!("`{channel}` is in {unit} and kept in it"));
-                kept = Some(unit.to_owned());
+                kept = Some(if units::is_count(unit) { "counts" } else { unit }.to_owned());
             }
             Conversion::NONE
         } else {

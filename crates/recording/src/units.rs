@@ -96,7 +96,7 @@ pub(crate) fn in_brackets(name: &str) -> Option<&str> {
     (!unit.is_empty()).then_some(unit)
 }
 
-/// Whether a unit says the counts of a converter, which what is recorded tells by itself.
+/// Whether a unit is the counts of a converter, by any name.
 pub(crate) fn is_count(unit: &str) -> bool {
     ["adu", "count", "counts", "cts", "dn", "lsb", "raw"].iter().any(|name| unit.eq_ignore_ascii_case(name))
 }

@@ -121,6 +121,28 @@ fn channels_in_counts_or_in_a_field_are_kept_in_it_together() {
 }
 
 #[test]
+fn currents_of_photodiodes_are_no_missing_values() {
+    let recording = read("t_s,xc_v,yc_v\ns,nA,nA\n0,100,0\n1,0,100\n", &[]).unwrap();
+    assert_eq!(recording.readout_unit.as_deref(), Some("nA"));
+    assert_warns(&recording, "`xc_v` is in nA and kept in it");
+}
+
+#[test]
+fn what_stands_in_brackets_and_is_no_unit_that_is_known_is_said_or_kept() {
+    let maps = ["t_s=Time (ticks)", "xc_v=PD1 [nA]", "yc_v=PD2 [nA]"];
+    let recording = read("Time (ticks),PD1 [nA],PD2 [nA]\n0,100,0\n1,0,100\n", &maps).unwrap();
+    assert_eq!(recording.readout_unit.as_deref(), Some("nA"));
+    assert_warns(&recording, "`t_s`: ticks is no unit that is known; it is taken for s");
+    let maps = ["xc_v=a (cts)", "yc_v=b (cts)"];
+    let recording = read("t_s,a (cts),b (cts)\n0,100,0\n1,0,100\n", &maps).unwrap();
+    assert_eq!(recording.readout_unit.as_deref(), Some("counts"));
+    // names and no units
+    let maps = ["xc_v=U (A)", "yc_v=U (B)"];
+    let recording = read("t_s,U (A),U (B)\n0,100,0\n1,0,100\n", &maps).unwrap();
+    assert_eq!((recording.readout_unit, recording.warnings.len()), (None, 0));
+}
+
+#[test]
 fn a_unit_in_the_brackets_of_a_mapped_name_is_a_conversion_too() {
     let text = "Time (ms),Pos [rad],A (left),B\n0,0,1,0\n10,1,0,1\n";
     let recording = read(text, &["t_s=Time (ms)", "table_deg=Pos [rad]", "xc_v=A (left)", "yc_v=B"]).unwrap();
