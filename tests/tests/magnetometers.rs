@@ -137,6 +137,7 @@ fn what_is_calibrated_without_a_reference_undoes_a_recording_with_one() {
     let read = Calibration::from_text(&text, "calibration.toml").unwrap();
     let theta = compensate(&read, &recording).unwrap().theta_deg.unwrap();
     let off = |i: usize| (theta[i] - theta[0] - degrees[i] + 180.0).rem_euclid(360.0) - 180.0;
-    // the skew of the channels is told, where they lie within the turn is not
-    assert!((0..theta.len()).all(|i| off(i).abs() < 20.0), "{:?}", &theta[..4]);
+    // as recorded the skew alone makes 8°; 0.001 of the radius in noise is 0.06°
+    let worst = (0..theta.len()).map(|i| off(i).abs()).fold(0.0, f64::max);
+    assert!(worst < 0.5, "{worst}°");
 }
