@@ -14,10 +14,9 @@ use cvg_calibration::recording::Instrument;
 use cvg_calibration::{Hypothesis, Member};
 use cvg_model::effects::{Inverse, Stage};
 
+use crate::report::WHOLE_TURN_RAD;
 use crate::{Failure, output};
 
-/// Periods beyond this are a whole turn, and no pattern's half.
-const WHOLE_TURN_RAD: f64 = 4.0;
 /// Points of a period at which a table is checked, for each of its own.
 const CHECKED: usize = 16;
 /// Points of a table where nobody says how many.

@@ -21,7 +21,7 @@ use serde_json::Value;
 use self::figures::Figure;
 use self::finding::{finding, of_the_device};
 use self::numbers::{degrees, times};
-pub(crate) use self::tables::name_of_angle;
+pub(crate) use self::tables::{WHOLE_TURN_RAD, name_of_angle};
 use crate::{Failure, clouds, output};
 
 const STYLE: &str = include_str!("page.css");

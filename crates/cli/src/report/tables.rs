@@ -17,7 +17,7 @@ const STRONG: f64 = 0.5;
 /// A mean rate below this, deg/s, is that of a rotation there and back.
 const BOTH_WAYS: f64 = 0.005;
 /// Periods beyond this are a whole turn, and no pattern's half.
-const WHOLE_TURN_RAD: f64 = 4.0;
+pub(crate) const WHOLE_TURN_RAD: f64 = 4.0;
 
 /// A gyroscope whose output is an angle of its own turns once a turn and has no pattern.
 pub(super) fn is_rate_gyroscope(identified: &Identification) -> bool {
