@@ -94,18 +94,14 @@ fn parameter(r: &Survey, name: &str) -> Option<(f64, f64)> {
 }
 
 fn truths(d: &Device) -> Vec<(&'static str, f64)> {
-    let polar = |(size, axis): (f64, f64)| (size * (2.0 * axis).cos(), size * (2.0 * axis).sin());
-    let ((dc, ds), (kc, ks)) = (polar(d.anisodamping), polar(d.split));
     vec![
         ("detection_gain_ratio", d.ratio),
         ("skew", d.skew),
         ("phase_difference", d.phase.1 - d.phase.0),
         ("actuation_gain_ratio", d.force.0 / d.force.1),
         ("actuation_skew", d.force_skew),
-        ("anisodamping_cos2", dc),
-        ("anisodamping_sin2", ds),
-        ("anisoelasticity_cos2", kc),
-        ("anisoelasticity_sin2", ks),
+        ("anisodamping", d.anisodamping.0),
+        ("anisoelasticity", d.split.0),
         ("kappa", d.cubic),
         ("offset_x", d.offset.0),
         ("offset_y", d.offset.1),
@@ -161,7 +157,7 @@ fn a_device_that_only_rested_is_told_the_product_and_nothing_of_its_parts() {
     let claimed =
         ["detection-gain-mismatch", "detection-skew", "detection-phase", "actuation-gain-mismatch", "actuation-skew"];
     assert!(!r.effects.iter().any(|e| claimed.contains(&e.id.as_str())), "{:?}", r.effects);
-    let told = &r.virtual_precession.as_ref().unwrap().not_told;
+    let told = &r.virtual_precession.as_ref().unwrap().not_identifiable;
     assert!(told.iter().any(|n| n.separated_by.contains("turning by hand")), "{told:?}");
     let product = parameter(r, "product_ratio").unwrap().0;
     let truth = device.ratio * device.force.1 / device.force.0;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use cvg_calibration::report::named::{self, BESIDE_THE_LIBRARY, Beside};
 use cvg_model::effects::{Description, EffectId, Role, Scaling};
 use serde_json::{Value, json};
 
@@ -9,6 +10,11 @@ use crate::{Failure, output};
 
 /// Prints the library, or one effect of it.
 pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) -> Result<(), Failure> {
+    if let Some(beside) = BESIDE_THE_LIBRARY.iter().find(|e| effect == Some(e.id)) {
+        let as_text = || serde_json::to_string_pretty(&[beside_facts(beside)]).map_err(Failure::input);
+        let text = if as_json { format!("{}\n", as_text()?) } else { beside_in_full(beside) };
+        return output::answer(&text);
+    }
     let chosen: Vec<&Description> = match effect {
         None => EffectId::ALL.iter().map(|e| e.description()).collect(),
         Some(id) => vec![EffectId::from_id(id).ok_or_else(|| unknown(id))?.description()],
@@ -23,10 +29,18 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
         }
     } else {
         for d in chosen {
-            output::answer(&format!("{:<25}{:<11}{}\n", d.id, stage(d), d.title))?;
+            output::answer(&listed(d.id, &stage(d), d.title))?;
+        }
+        output::answer("\nIn reports alone, of no file of the library:\n")?;
+        for e in BESIDE_THE_LIBRARY {
+            output::answer(&listed(e.id, e.stage, &format!("{} ({})", e.title, e.of)))?;
         }
     }
     Ok(())
+}
+
+fn listed(id: &str, stage: &str, title: &str) -> String {
+    format!("{id:<25}{stage:<11}{title}\n")
 }
 
 /// The library as JSON.
@@ -50,7 +64,11 @@ pub(crate) fn export(id: &str) -> Result<(), Failure> {
 
 fn unknown(id: &str) -> Failure {
     let ids: Vec<&str> = EffectId::ALL.iter().map(|e| e.description().id).collect();
-    Failure::input(format!("the library has no effect `{id}`; it has {}", ids.join(", ")))
+    let beside = BESIDE_THE_LIBRARY.map(|e| e.id).join(", ");
+    Failure::input(format!(
+        "the library has no effect `{id}`; it has {}, and reports have beside it {beside}",
+        ids.join(", ")
+    ))
 }
 
 fn stage(d: &Description) -> String {
@@ -102,15 +120,24 @@ fn facts(d: &Description) -> Value {
         .collect();
     json!({
         "id": d.id, "title": d.title, "stage": stage(d), "origin": origin(d), "in_sensors": d.in_sensors,
-        "parameters": parameters, "signature": d.signature, "source": d.source,
+        "parameters": parameters, "reported": as_reported(&named::of_effect(d)), "signature": d.signature, "source": d.source,
         "scaling": {"rate": d.scaling.rate, "amplitude": d.scaling.amplitude, "odd_in_rate": d.scaling.odd_in_rate},
     })
+}
+
+/// Names of numbers in a report, as JSON.
+fn as_reported(names: &[(&str, &str)]) -> Vec<Value> {
+    names.iter().map(|(name, unit)| json!({"name": name.replace('#', "N"), "unit": unit})).collect()
+}
+
+fn beside_facts(e: &Beside) -> Value {
+    json!({"id": e.id, "title": e.title, "stage": e.stage, "reports_of": e.of, "reported": as_reported(e.parameters)})
 }
 
 fn in_full(d: &Description) -> String {
     let mut s = format!("{}: {}\n", d.id, d.title);
     let mut line = |what: &str, value: &str| {
-        let _ = writeln!(s, "  {what:<12}{value}");
+        let _ = writeln!(s, "  {what:<22}{value}");
     };
     line("acts in", &stage(d));
     line("origin", origin(d));
@@ -120,9 +147,37 @@ fn in_full(d: &Description) -> String {
         let bounds = format!("{} [{}], {} to {}, {}", p.name, p.unit, p.lower, p.upper, role(p.role));
         line("parameter", &bounds);
     }
-    line("in sensors", if d.in_sensors { "yes" } else { "no" });
+    line("reported as", &reported(&named::of_effect(d)));
+    line("simulated in sensors", if d.in_sensors { "yes" } else { "no" });
     line("source", d.source);
     s
+}
+
+/// An effect that reports have beside the library's, and the names of its numbers there.
+fn beside_in_full(e: &Beside) -> String {
+    format!(
+        "{}: {}\n  {:<22}{}\n  {:<22}{}\n  {:<22}reports of {} alone\n",
+        e.id,
+        e.title,
+        "acts in",
+        e.stage,
+        "reported as",
+        reported(e.parameters),
+        "in",
+        e.of
+    )
+}
+
+/// The names of numbers in a report, with their units.
+fn reported(names: &[(&str, &str)]) -> String {
+    let each: Vec<String> = names.iter().map(|(name, unit)| format!("{} [{unit}]", name.replace('#', "N"))).collect();
+    each.join(", ")
+}
+
+/// The same for the book.
+fn coded(names: &[(&str, &str)]) -> String {
+    let each: Vec<String> = names.iter().map(|(name, unit)| format!("`{}` [{unit}]", name.replace('#', "N"))).collect();
+    each.join(", ")
 }
 
 /// The page of the book.
@@ -151,6 +206,21 @@ fn page() -> String {
         );
     }
     s.push_str(LOOK_ALIKES);
+    s.push_str(
+        "\n## In reports alone\n\nOf no file of the library. N is a number from 1 on.\n\n\
+         | effect | stage | in reports of | numbers | what it is |\n| --- | --- | --- | --- | --- |\n",
+    );
+    for e in BESIDE_THE_LIBRARY {
+        let _ = writeln!(s, "| `{}` | {} | {} | {} | {} |", e.id, e.stage, e.of, coded(e.parameters), e.title);
+    }
+    s.push_str("\n## Names in reports\n\nReports show a pair of parameters as a magnitude and an angle, by names of their own:\n\n");
+    s.push_str("| effect | in reports |\n| --- | --- |\n");
+    for d in EffectId::ALL.iter().map(|e| e.description()) {
+        let names = named::of_effect(d);
+        if names != d.parameters.iter().map(|p| (p.name, p.unit)).collect::<Vec<_>>() {
+            let _ = writeln!(s, "| `{}` | {} |", d.id, coded(&names));
+        }
+    }
     s
 }
 

@@ -1,9 +1,10 @@
 //! The places of the numbers of report.json, as `--limits` names them: what is misspelt is told before anything is identified.
 
-use cvg_model::effects::EffectId;
+use cvg_calibration::report::named::{self, BESIDE_THE_LIBRARY};
+use cvg_model::effects::{EffectId, Shown};
 
 /// Every number of a report. `*` is an element of a list, by number or name; `**` whatever stands below; `~` an estimate with
-/// its interval; `^` the size of an error.
+/// its interval; `^` the size of an error. A name that ends in `#` has a number there.
 const NUMBERS: &[&str] = &[
     "angular_gain~",
     "detection_gain_ratio~",
@@ -19,8 +20,6 @@ const NUMBERS: &[&str] = &[
     "radius.correction_rms_deg",
     "radius.largest_gap_deg",
     "effects.*.parameters.*~",
-    "effects.angle-table.parameters.*~",
-    "effects.detection-clip.parameters.*~",
     "effects.*.heldout_rms_deg.before",
     "effects.*.heldout_rms_deg.after",
     "steps.*.heldout^",
@@ -95,18 +94,52 @@ pub(crate) fn is_known(path: &str, written: &[EffectId]) -> bool {
     all.chain(of_effects(written)).any(|place| fits(&place))
 }
 
-/// The place that a misspelt one is nearest to.
+/// The place that a misspelt one is nearest to; of an effect that there is, one of its own.
 pub(crate) fn nearest(path: &str, written: &[EffectId]) -> Option<String> {
     let whole = format!("{path}.value");
     if is_known(&whole, written) {
         return Some(whole);
     }
     let keys: Vec<&str> = path.split('.').collect();
-    let all = places().into_iter().filter(|place| !place.starts_with("effects.*")).chain(of_effects(written));
+    let of_effects = of_effects(written);
+    if let ["effects", id, rest @ ..] = keys.as_slice()
+        && id.parse::<usize>().is_err()
+    {
+        let ids = of_effects.iter().filter_map(|place| place.split('.').nth(1)).map(|known| (apart(id, known), known));
+        let known =
+            ids.min_by_key(|(apart, _)| *apart).filter(|(apart, _)| is_near(*apart, id)).map(|(_, known)| known);
+        let own = known.map_or(String::new(), |known| format!("effects.{known}."));
+        let magnitude = known.zip(rest.get(1)).and_then(|(known, name)| magnitude(known, name));
+        let rest: Vec<&str> =
+            rest.iter().enumerate().map(|(at, key)| magnitude.filter(|_| at == 1).unwrap_or(key)).collect();
+        let rest = rest.join(".");
+        let by_name = |of: &&str| of.split('.').nth(1).is_none_or(|name| name != "#" && name.parse::<usize>().is_err());
+        let of_it = of_effects.iter().filter_map(|place| {
+            let of = place.strip_prefix(&own).filter(by_name)?;
+            Some((apart(&rest, of), place))
+        });
+        return of_it.min_by_key(|own| own.0).filter(|_| known.is_some()).map(|(_, place)| as_named(place, &keys));
+    }
+    let all = places().into_iter().filter(|place| !place.starts_with("effects.*")).chain(of_effects);
     let named = all.map(|place| as_named(&place, &keys));
     let (place, apart) =
         named.map(|place| (apart(path, &place), place)).map(|(n, place)| (place, n)).min_by_key(|p| p.1)?;
-    ((apart as f64) < NEAR * path.len() as f64).then_some(place)
+    is_near(apart, path).then_some(place)
+}
+
+/// By which name reports have a parameter that the library counts as one of a pair.
+fn magnitude(effect: &str, parameter: &str) -> Option<&'static str> {
+    let d = EffectId::from_id(effect)?.description();
+    let at = d.parameters.iter().position(|p| p.name == parameter)?;
+    d.shown.iter().find_map(|shown| match *shown {
+        Shown::Polar { cos, sin, magnitude, .. } if [cos, sin].contains(&at) => Some(magnitude),
+        _ => None,
+    })
+}
+
+/// Whether a name is another with so many letters wrong.
+fn is_near(apart: usize, name: &str) -> bool {
+    (apart as f64) < NEAR * name.len() as f64
 }
 
 fn places() -> Vec<String> {
@@ -121,17 +154,20 @@ fn places() -> Vec<String> {
         .collect()
 }
 
-/// The numbers of every effect there is, by its name and those of its parameters.
+/// The numbers of every effect there is, by its name and those of its parameters as reports have them.
 fn of_effects(written: &[EffectId]) -> Vec<String> {
-    let of = |effect: &EffectId| {
-        let d = effect.description();
-        let parameters = d.parameters.iter().flat_map(|p| ESTIMATE.map(|end| format!("parameters.{}{end}", p.name)));
-        let by_number =
-            ESTIMATE.iter().flat_map(|end| (0..d.parameters.len()).map(move |i| format!("parameters.{i}{end}")));
+    let of = |(id, names): (&str, Vec<&str>)| {
+        let parameters = names.iter().flat_map(|name| ESTIMATE.map(|end| format!("parameters.{name}{end}")));
+        let is_endless = names.iter().any(|name| name.ends_with('#'));
+        let numbers = if is_endless { vec!["#".into()] } else { (0..names.len()).map(|at| at.to_string()).collect() };
+        let by_number = numbers.iter().flat_map(|number| ESTIMATE.map(|end| format!("parameters.{number}{end}")));
         let error = ["heldout_rms_deg.before", "heldout_rms_deg.after"].map(str::to_owned);
-        parameters.chain(by_number).chain(error).map(|rest| format!("effects.{}.{rest}", d.id)).collect::<Vec<_>>()
+        parameters.chain(by_number).chain(error).map(|rest| format!("effects.{id}.{rest}")).collect::<Vec<_>>()
     };
-    EffectId::ALL.iter().chain(written).flat_map(of).collect()
+    let names = |of: &[(&'static str, &'static str)]| of.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+    let library = EffectId::ALL.iter().chain(written).map(|effect| effect.description());
+    let library = library.map(|d| (d.id, names(&named::of_effect(d))));
+    library.chain(BESIDE_THE_LIBRARY.iter().map(|e| (e.id, names(e.parameters)))).flat_map(of).collect()
 }
 
 /// Whether keys stand at a place. The name of an element may have dots in it, as a file's has.
@@ -140,9 +176,15 @@ fn fits(place: &[&str], keys: &[&str]) -> bool {
         ([], []) => true,
         (["**"], [_, ..]) => true,
         (["*", rest @ ..], [_, ..]) => (1..=keys.len()).any(|n| fits(rest, &keys[n..])),
-        ([key, rest @ ..], [first, others @ ..]) => key == first && fits(rest, others),
+        ([key, rest @ ..], [first, others @ ..]) => is_named(key, first) && fits(rest, others),
         _ => false,
     }
+}
+
+/// Whether a key is the name, or the name with a number for its `#`.
+fn is_named(name: &str, key: &str) -> bool {
+    let number = name.strip_suffix('#').and_then(|start| key.strip_prefix(start));
+    name == key || number.is_some_and(|number| number.parse::<u32>().is_ok())
 }
 
 /// A place with the elements that the keys name.
@@ -154,13 +196,16 @@ fn as_named(place: &str, keys: &[&str]) -> String {
         let taken = if *part == "*" && at == 1 { 1 + more } else { 1 };
         let own = keys.get(at..(at + taken).min(keys.len())).filter(|own| !own.is_empty()).map(|own| own.join("."));
         at += taken;
-        if part.starts_with('*') { own.unwrap_or_else(|| "0".into()) } else { (*part).to_owned() }
+        match own {
+            Some(own) if part.starts_with('*') || is_named(part, &own) => own,
+            _ => part.replace('*', "0").replace('#', "1"),
+        }
     });
     named.collect::<Vec<_>>().join(".")
 }
 
 /// How many letters have to be changed, added or taken away between two names.
-fn apart(a: &str, b: &str) -> usize {
+pub(crate) fn apart(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut last: Vec<usize> = (0..=b.len()).collect();
     for (i, letter) in a.chars().enumerate() {
@@ -188,6 +233,16 @@ mod tests {
             ("runs.rot+500.csv.spike", "runs.rot+500.csv.spikes"),
             ("runs.hall-0.0003_0.csv.angular_gain", "runs.hall-0.0003_0.csv.angular_gain.value"),
             ("allan.bias_instability.value", "allan.bias_instability_dph.value"),
+            // the name of the library, which shows the pair as a magnitude and an angle
+            (
+                "effects.anisodamping.parameters.anisodamping_cos2.value",
+                "effects.anisodamping.parameters.anisodamping.value",
+            ),
+            ("effects.table-harmonic.parameters.ripple_cos.value", "effects.table-harmonic.parameters.w.value"),
+            // the effect first, and then what it has
+            ("effects.detection-cubik.parameters.kapa.value", "effects.detection-cubic.parameters.kappa.value"),
+            ("effects.detection-cubic.value", "effects.detection-cubic.parameters.kappa.value"),
+            ("effects.angle-table.parameters.cos2.value", "effects.angle-table.parameters.cos_1.value"),
         ] {
             assert!(!is_known(path, &[]), "{path}");
             assert_eq!(nearest(path, &[]).as_deref(), Some(meant));
@@ -198,8 +253,16 @@ mod tests {
 
     #[test]
     fn an_element_is_named_by_its_number_or_by_a_name_with_dots() {
-        for path in ["effects.0.parameters.0.value", "runs.a.b.csv.rows", "runs.0.tau_s.ci95.1", "channels.angle.rms"] {
+        for path in [
+            "effects.0.parameters.0.value",
+            "runs.a.b.csv.rows",
+            "runs.0.tau_s.ci95.1",
+            "channels.angle.rms",
+            "effects.angle-table.parameters.cos_12.ci95.0",
+            "effects.angle-table.parameters.23.value",
+        ] {
             assert!(is_known(path, &[]), "{path}");
         }
+        assert!(!is_known("effects.angle-table.parameters.cos_twelve.value", &[]));
     }
 }

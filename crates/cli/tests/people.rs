@@ -9,6 +9,7 @@ use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
+use cvg_calibration::report::named::{self, BESIDE_THE_LIBRARY};
 use cvg_model::effects::EffectId;
 use cvg_simulator::Scenario;
 use cvg_simulator::scenario::EffectSetting;
@@ -150,13 +151,26 @@ fn inspect_says_what_is_in_a_file_and_what_is_wrong_with_it() {
 fn the_library_is_listed_as_its_descriptions_tell_it() {
     let list = cvg_ok(&["effects"]);
     let library = json(&cvg_ok(&["effects", "--json"]));
-    assert_eq!(list.lines().count(), EffectId::ALL.len());
+    let (of_the_library, of_reports) = list.split_once("\nIn reports alone, of no file of the library:\n").unwrap();
+    assert_eq!(
+        (of_the_library.lines().count(), of_reports.lines().count()),
+        (EffectId::ALL.len(), BESIDE_THE_LIBRARY.len())
+    );
     for (effect, facts) in EffectId::ALL.iter().zip(library.as_array().unwrap()) {
         let d = effect.description();
         assert!(list.contains(d.id) && list.contains(d.title));
         assert_eq!((facts["id"].as_str(), facts["signature"].as_str()), (Some(d.id), Some(d.signature)));
         let full = cvg_ok(&["effects", d.id]);
         assert!(d.parameters.iter().all(|p| full.contains(p.name)), "{full}");
+        // a pair is a magnitude and an angle in reports
+        assert!(named::of_effect(d).iter().all(|(name, unit)| full.contains(&format!("{name} [{unit}]"))), "{full}");
+    }
+    for e in BESIDE_THE_LIBRARY {
+        assert!(of_reports.contains(e.id) && of_reports.contains(e.title), "{of_reports}");
+        let full = cvg_ok(&["effects", e.id]);
+        assert!(full.contains(e.stage) && full.contains(&e.parameters[0].0.replace('#', "N")), "{full}");
+        let facts = json(&cvg_ok(&["effects", e.id, "--json"]));
+        assert_eq!(facts[0]["reported"].as_array().map(Vec::len), Some(e.parameters.len()), "{facts}");
     }
     let refused = cvg(&["effects", "gremlins"]);
     assert_eq!(refused.status, 2);

@@ -9,7 +9,9 @@ use super::readout::{Kind, Readout};
 use super::table_fit::Motion;
 use crate::diagnostics::decomposition::{BLOCKS, STUDENT_19};
 use crate::model::hypothesis::{ChannelClip, Hypothesis, Member, Origin};
+use crate::numerics::angles::phase;
 use crate::recording::Instrument;
+use crate::report::named::{ACCELERATION_LAG, ANGLE_TABLE, DETECTION_CLIP};
 use crate::report::{EffectReport, Estimate, ParameterReport};
 
 /// How many values of the library a readout has.
@@ -166,7 +168,7 @@ impl Described<'_> {
                 let p = vec![parameter("acceleration_lag", "s^2", -side[1] / gain, d[1] / gain.abs())];
                 let evidence = format!("angle ∝ acceleration, as of a type-II tracking loop; {}", self.evidence());
                 let late = (side[0] != 0.0).then(lag);
-                late.into_iter().chain([effect("acceleration-lag", Origin::Empirical, p, evidence)]).collect()
+                late.into_iter().chain([effect(ACCELERATION_LAG.id, Origin::Empirical, p, evidence)]).collect()
             }
         }
     }
@@ -190,7 +192,7 @@ impl Described<'_> {
             table.cos.len(),
             self.evidence()
         );
-        (!parameters.is_empty()).then(|| effect("angle-table", Origin::Empirical, parameters, evidence))
+        (!parameters.is_empty()).then(|| effect(ANGLE_TABLE.id, Origin::Empirical, parameters, evidence))
     }
 
     fn line_effects(&self) -> Vec<EffectReport> {
@@ -207,7 +209,7 @@ impl Described<'_> {
             let p = vec![
                 parameter("n", "1", f64::from(*n), f64::NAN),
                 parameter("amplitude", "rad", size, (c * dc).hypot(s * ds) / size),
-                parameter("phase", "deg", (-s).atan2(c).to_degrees(), of_phase.to_degrees()),
+                parameter("phase", "deg", phase(c, -s).to_degrees(), of_phase.to_degrees()),
             ];
             let told = if at_one_phase { ", of which the stations tell one phase" } else { "" };
             let evidence = format!("{n} per turn of the reference, beyond the table{told}; {}", self.evidence());
@@ -287,13 +289,12 @@ pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> V
         add(*id, Origin::Discovered, &all);
     }
     if readout.rails.any() {
-        let names = ["x_low", "x_high", "y_low", "y_high"];
-        let limits = readout.rails.limits.iter().flatten().zip(names).filter(|(l, _)| l.is_finite());
-        let rails =
-            limits.map(|(l, name)| ParameterReport { name: name.into(), unit: "V".into(), value: *l, ci95: None });
+        let limits =
+            readout.rails.limits.iter().flatten().zip(DETECTION_CLIP.parameters).filter(|(l, _)| l.is_finite());
+        let rails = limits.map(|(l, (name, unit))| parameter(name, unit, *l, f64::NAN));
         let evidence = "the extreme value of the channel occurs far more often than the level beside it: a converter \
                         at its rail; the other channel and the radius stand in for it";
-        out.push(effect("detection-clip", Origin::Discovered, rails.collect(), evidence.into()));
+        out.push(effect(DETECTION_CLIP.id, Origin::Discovered, rails.collect(), evidence.into()));
     }
     if let Some(first) = out.first_mut().filter(|_| !not_told.is_empty()) {
         first.evidence.push_str("; undone with it, no further from nothing than their intervals:");

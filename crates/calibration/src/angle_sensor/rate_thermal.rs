@@ -20,10 +20,9 @@ use crate::diagnostics::temperature::LEAST_SPAN_K;
 use crate::model::hypothesis::Origin;
 use crate::numerics::interpolation::accumulated;
 use crate::numerics::statistics::{correlation, span};
+use crate::report::named::RATE_OFFSET_TEMPERATURE;
 use crate::report::{EffectReport, ParameterReport};
 
-/// The identifier of the effect in a report: the library's has no temperature.
-const ID: &str = "rate-offset-temperature";
 /// Runs go through the temperatures where the widest span of one is this share of that of all: engineering choice.
 const WITHIN: f64 = 0.5;
 /// A slope from runs of one temperature each that lies within what chance makes of one in 2,000 campaigns is none.
@@ -111,7 +110,7 @@ impl BiasOverTemperature {
     /// The effect, in the words of the report.
     pub(super) fn effect(&self) -> EffectReport {
         EffectReport {
-            id: ID.into(),
+            id: RATE_OFFSET_TEMPERATURE.id.into(),
             origin: Origin::Discovered,
             parameters: vec![ParameterReport {
                 name: "rate_offset_per_k".into(),

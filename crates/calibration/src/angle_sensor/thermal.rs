@@ -24,6 +24,7 @@ use crate::model::hypothesis::{Member, Origin};
 use crate::model::written::EffectText;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{correlation, span};
+use crate::report::named::OFFSET_TEMPERATURE;
 use crate::report::{EffectReport, Estimate, ParameterReport};
 
 /// A slope that lies within what chance makes of one in 2,000 campaigns is none.
@@ -175,7 +176,7 @@ impl Thermal {
         let gain = self.is_told(2).then(|| effect("temperature", vec![parameter(2, "gain_per_k", "1/K")]));
         let offsets = (self.is_told(0) || self.is_told(1)).then(|| {
             let each = [(0, "offset_x_per_k"), (1, "offset_y_per_k")].into_iter().filter(|(at, _)| self.is_told(*at));
-            effect("offset-temperature", each.map(|(at, name)| parameter(at, name, "V/K")).collect())
+            effect(OFFSET_TEMPERATURE.id, each.map(|(at, name)| parameter(at, name, "V/K")).collect())
         });
         gain.into_iter().chain(offsets).collect()
     }
@@ -184,7 +185,7 @@ impl Thermal {
     pub(super) fn members(&self) -> Vec<Member> {
         let member = |id, values| Member { id, values, origin: Origin::Discovered, refined: true };
         let offsets =
-            || EffectText::parse(OFFSETS, "offset-temperature").and_then(|text| text.effect("offset-temperature"));
+            || EffectText::parse(OFFSETS, OFFSET_TEMPERATURE.id).and_then(|text| text.effect(OFFSET_TEMPERATURE.id));
         let gain = self.is_told(2).then(|| member(EffectId::Temperature, [self.slopes[2], 0.0, 0.0, 0.0]));
         let offsets = (self.is_told(0) || self.is_told(1)).then(offsets).and_then(Result::ok);
         gain.into_iter().chain(offsets.map(|id| member(id, [self.slopes[0], self.slopes[1], 0.0, 0.0]))).collect()

@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::diagnostics::evaluate::Evaluation;
 use crate::estimation::residuals::Residual;
 use crate::facts::{Follows, Harmonic};
+use crate::numerics::angles::phase;
 use crate::numerics::statistics::median;
 
 impl Residual {
@@ -290,7 +291,7 @@ pub(crate) fn harmonics(evaluation: &Evaluation, of: Follows, most: u32, inflati
                 amplitude_deg: c.hypot(s).to_degrees(),
                 ci95_deg: 1.96 * (variance * rest * inflation).sqrt().to_degrees(),
                 // c cos nθ + s sin nθ = A cos(nθ + phase) with c = A cos phase, s = −A sin phase
-                phase_deg: (-s).atan2(c).to_degrees(),
+                phase_deg: phase(c, -s).to_degrees(),
             }
         })
         .collect()

@@ -9,13 +9,9 @@ use super::runs::DecayRun;
 use super::selection::{Added, BELIEVED, is_declared, one_rate};
 use crate::model::hypothesis::Origin;
 use crate::numerics::angles::wrapped;
+use crate::report::named::{DAMPING_NONLINEAR, SPRING_ISOTROPIC};
 use crate::report::polar::polar;
 use crate::report::{BeforeAfter, EffectReport, Estimate, ParameterReport, Rival};
-
-/// An isotropic nonlinear spring: θ̇ += c·Q, and a frequency that goes with E.
-const SPRING: &str = "spring-isotropic";
-/// Damping that grows with the square of the amplitude; of no effect of the library.
-const DAMPING_GROWTH: &str = "damping-nonlinear";
 
 /// What the offsets of x_c, x_s, y_c and y_s are called: those in phase as the library has them.
 const OFFSET_NAMES: [&str; 4] = ["offset_x", "offset_x_quadrature", "offset_y", "offset_y_quadrature"];
@@ -27,8 +23,8 @@ pub(crate) fn name(term: Term) -> &'static str {
         Term::DampingAlong | Term::DampingAcross => EffectId::Anisodamping.description().id,
         Term::SplitAlong | Term::SplitAcross => EffectId::Anisoelasticity.description().id,
         Term::AngularGain | Term::Precession => "precession",
-        Term::Spring => SPRING,
-        Term::DampingGrowth => DAMPING_GROWTH,
+        Term::Spring => SPRING_ISOTROPIC.id,
+        Term::DampingGrowth => DAMPING_NONLINEAR.id,
         Term::GainRatio => EffectId::DetectionGainMismatch.description().id,
         Term::Skew => EffectId::DetectionSkew.description().id,
         Term::Phase => EffectId::DetectionPhase.description().id,

@@ -16,10 +16,31 @@ pub(crate) fn unwrapped(angles: impl Iterator<Item = f64>, period: f64) -> Vec<f
     out
 }
 
+/// A phase off nothing, or off half a turn, by no more than rounding is that.
+const ROUNDING: f64 = 1e-12;
+
+/// The angle of (cos, sin), in (−π, π].
+pub(crate) fn phase(cos: f64, sin: f64) -> f64 {
+    let angle = sin.atan2(cos);
+    match () {
+        () if angle.abs() < ROUNDING => 0.0,
+        () if angle.abs() > std::f64::consts::PI - ROUNDING => std::f64::consts::PI,
+        () => angle,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+    #[test]
+    fn half_a_turn_is_not_less_than_nothing_and_rounding_is_no_phase() {
+        let of = [(-1.0, -0.0), (-1.0, 0.0), (-1.0, -1e-15), (1.0, -1e-15), (1.0, -0.0), (0.0, -1.0)];
+        let phases = of.map(|(cos, sin)| phase(cos, sin));
+        assert_eq!(phases, [PI, PI, PI, 0.0, 0.0, -FRAC_PI_2]);
+        assert!(phases[4].is_sign_positive());
+    }
 
     #[test]
     fn an_angle_of_any_wrapping_is_continuous() {

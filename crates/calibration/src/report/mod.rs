@@ -8,6 +8,7 @@ pub(crate) mod compensate;
 pub(crate) mod gate;
 pub(crate) mod inference;
 pub(crate) mod laws;
+pub mod named;
 pub(crate) mod polar;
 pub(crate) mod proposals;
 pub(crate) mod provenance;

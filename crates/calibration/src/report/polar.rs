@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use crate::numerics::angles::phase;
 use crate::report::Estimate;
 
 /// The 97.5 % point of the normal distribution.
@@ -26,7 +27,7 @@ pub(crate) fn polar([c, s]: [f64; 2], (vc, vs, vcs): (f64, f64, f64), division: 
     let reach = farthest.max(NORMAL * turn).min(PI);
     let degrees = |turned: f64| (turned / division).to_degrees();
     let angle =
-        Estimate { value: degrees(s.atan2(c)), ci95: [degrees(s.atan2(c) - reach), degrees(s.atan2(c) + reach)] };
+        Estimate { value: degrees(phase(c, s)), ci95: [degrees(phase(c, s) - reach), degrees(phase(c, s) + reach)] };
     (Estimate::new(c.hypot(s), along.sqrt()), angle)
 }
 

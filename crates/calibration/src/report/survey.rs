@@ -18,18 +18,18 @@ pub struct VirtualPrecession {
     pub bias_deg: f64,
     /// numbers beside those of effects; an interval is null where none could be shown to hold
     pub parameters: Vec<ParameterReport>,
-    /// what is not told, and which run would tell it
-    pub not_told: Vec<NotTold>,
+    /// what these runs do not identify, and which run would
+    pub not_identifiable: Vec<NotIdentifiable>,
     /// what is left of rows that nothing was fitted to
     pub heldout: Vec<Innovation>,
 }
 
-/// Something that a campaign does not tell.
+/// Something that a campaign does not identify.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct NotTold {
+pub struct NotIdentifiable {
     /// what
     pub what: String,
-    /// the run that would tell it
+    /// the run that would
     pub separated_by: String,
 }
 

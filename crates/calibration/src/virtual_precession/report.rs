@@ -1,18 +1,19 @@
-//! What the filter learned, in the form that all instruments share: numbers with intervals, what is not told, and which run
-//! would tell it.
+//! What the filter learned, in the form that all instruments share: numbers with intervals, what is not identifiable, and
+//! which run would tell it.
 
 use cvg_calibrator::replay::Replay;
 use cvg_calibrator::{Correction, Parameter, Settings};
-use cvg_model::effects::{EffectId, Values};
+use cvg_model::effects::{EffectId, Shown, Values};
 
 use super::identify::PACE_S;
 use crate::error::Refusal;
 use crate::model::hypothesis::{Hypothesis, Member, Origin};
 use crate::recording::{Campaign, Instrument, Role};
 use crate::report::calibration::{Calibration, Provenance};
+use crate::report::polar::polar;
 use crate::report::provenance;
 use crate::report::recorded::run_report;
-use crate::report::survey::{Innovation, NotTold, Survey, VirtualPrecession};
+use crate::report::survey::{Innovation, NotIdentifiable, Survey, VirtualPrecession};
 use crate::report::{EffectReport, Estimate, ParameterReport, Status, Tool};
 use crate::survey::Surveyed;
 
@@ -63,7 +64,7 @@ pub(crate) fn report(
         detection_known: status.detection_known,
         bias_deg: status.bias_rad.to_degrees(),
         parameters: found.parameters(),
-        not_told: found.not_told(),
+        not_identifiable: found.not_identifiable(),
         heldout,
     });
     let calibration = if status.detection_known {
@@ -170,20 +171,16 @@ impl Finding<'_> {
     }
 
     fn effects(&self) -> Vec<EffectReport> {
-        let report = |(id, values, deviations): (EffectId, Values<f64>, Vec<Option<f64>>)| {
-            let description = id.description();
-            let parameters = description.parameters.iter().zip(values).zip(deviations);
-            EffectReport {
-                id: description.id.into(),
-                origin: if description.declared { Origin::Declared } else { Origin::Discovered },
-                parameters: parameters.map(|((p, value), d)| entry(p.name, p.unit, value, d)).collect(),
-                heldout_rms_deg: None,
-                evidence: evidence(id).into(),
-                confounded_with: Vec::new(),
-                separated_by: None,
-            }
+        let report = |(id, values, deviations): (EffectId, Values<f64>, Vec<Option<f64>>)| EffectReport {
+            id: id.description().id.into(),
+            origin: if id.description().declared { Origin::Declared } else { Origin::Discovered },
+            parameters: shown(id, &values, &deviations),
+            heldout_rms_deg: None,
+            evidence: evidence(id).into(),
+            confounded_with: Vec::new(),
+            separated_by: None,
         };
-        self.members().into_iter().map(report).filter(does_something).collect()
+        self.members().into_iter().filter(does_something).map(report).collect()
     }
 
     /// What no effect of the library says.
@@ -209,9 +206,9 @@ impl Finding<'_> {
         out
     }
 
-    fn not_told(&self) -> Vec<NotTold> {
+    fn not_identifiable(&self) -> Vec<NotIdentifiable> {
         let mut out = Vec::new();
-        let mut say = |what: &str, by: &str| out.push(NotTold { what: what.into(), separated_by: by.into() });
+        let mut say = |what: &str, by: &str| out.push(NotIdentifiable { what: what.into(), separated_by: by.into() });
         if !self.detection_known {
             say(
                 "the share of the detection in the product of detection and actuation",
@@ -253,12 +250,35 @@ impl Finding<'_> {
     }
 }
 
+/// Values as reports show them: each that has a deviation here, and a pair as a magnitude and an angle.
+fn shown(id: EffectId, values: &Values<f64>, deviations: &[Option<f64>]) -> Vec<ParameterReport> {
+    let d = id.description();
+    let mut out = Vec::new();
+    for shown in d.shown {
+        match *shown {
+            Shown::Plain(at) => {
+                out.extend(
+                    deviations
+                        .get(at)
+                        .map(|d_at| entry(d.parameters[at].name, d.parameters[at].unit, values[at], *d_at)),
+                );
+            }
+            Shown::Polar { cos, sin, magnitude, unit, angle, division } => {
+                let (size, turned) = polar([values[cos], values[sin]], (0.0, 0.0, 0.0), division);
+                out.extend([entry(magnitude, unit, size.value, None), entry(angle, "deg", turned.value, None)]);
+            }
+        }
+    }
+    out
+}
+
 /// An effect that is worth nothing within the intervals of its parameters is none.
-fn does_something(effect: &EffectReport) -> bool {
-    let Some(id) = EffectId::from_id(&effect.id) else { return true };
-    let is_neutral =
-        |(p, neutral): (&ParameterReport, f64)| p.ci95.is_some_and(|[low, high]| low <= neutral && neutral <= high);
-    !effect.parameters.iter().zip(id.neutral()).all(is_neutral)
+fn does_something((id, values, deviations): &(EffectId, Values<f64>, Vec<Option<f64>>)) -> bool {
+    let is_neutral = |((deviation, value), neutral): ((&Option<f64>, &f64), f64)| {
+        deviation
+            .is_some_and(|d| Estimate::new(*value, d).ci95[0] <= neutral && neutral <= Estimate::new(*value, d).ci95[1])
+    };
+    !deviations.iter().zip(values).zip(id.neutral()).all(is_neutral)
 }
 
 /// What speaks for an effect.

@@ -116,7 +116,7 @@ fn without_a_table(h: &mut String, r: &Survey) {
     let Some(v) = &r.virtual_precession else { return };
     h.push_str("<h2 id=\"not-identifiable\">Not identifiable from this campaign</h2>");
     table(h, "and which run would tell it", &["what", "separated by"], |h| {
-        for n in &v.not_told {
+        for n in &v.not_identifiable {
             row(h, &[&escape(&n.what), &escape(&n.separated_by)]);
         }
     });
@@ -212,7 +212,7 @@ pub(crate) fn summary(r: &Survey) -> String {
             let unit = if p.unit == "1" { "" } else { &p.unit };
             line(format!("  {:<26} {} {unit}", p.name, measured(p.value, p.ci95)).trim_end().to_owned());
         }
-        for n in &v.not_told {
+        for n in &v.not_identifiable {
             line(format!("  not identifiable: {}; it takes {}", n.what, n.separated_by));
         }
     }
