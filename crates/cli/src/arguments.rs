@@ -6,13 +6,13 @@ use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use cvg_calibration::recording::{Campaign, Naming};
 
-use crate::input;
+use crate::{input, output};
 
 /// Find, explain and remove the angle errors of whole-angle gyroscopes and sin/cos sensors.
 #[derive(Parser)]
 #[command(name = "cvg", version, about, after_help = EXAMPLES)]
 pub(crate) struct Arguments {
-    /// Memory that a recording may take while it is read, as in 512M or 4G; a quarter of the machine's where nothing is said
+    /// Memory that a recording may take while it is read, as in 512M, 4G or 4GiB; a quarter of the machine's where nothing is said
     #[arg(long, global = true, value_name = "BYTES", value_parser = bytes)]
     pub(crate) max_memory: Option<u64>,
     #[command(subcommand)]
@@ -28,7 +28,7 @@ Examples:
   cvg compensate results/calibration.toml rot.csv --out rot-compensated.csv
   cvg simulate scenario.toml --out bench            a campaign, and what it was set to
 
-Exit status: 0 done, 1 the data does not allow an answer, 2 bad use or bad input.";
+Exit status: 0 done, 1 the data does not allow an answer or a limit failed, 2 bad use or bad input.";
 
 const IDENTIFY: &str = "\
 Examples:
@@ -82,21 +82,26 @@ Examples:
   cvg completions zsh > ~/.zfunc/_cvg
   cvg completions fish > ~/.config/fish/completions/cvg.fish";
 
-/// A number of bytes, with K, M or G for thousands, millions or billions of them.
+/// A number of bytes, with K, M or G for thousands, millions or billions of them, Ki, Mi or Gi for powers of 1024.
 fn bytes(text: &str) -> Result<u64, String> {
-    let text = text.trim().trim_end_matches(['B', 'b']);
-    let unit = match text.chars().last().map(|sign| sign.to_ascii_uppercase()) {
-        Some('K') => 1_000,
-        Some('M') => 1_000_000,
-        Some('G') => 1_000_000_000,
-        _ => 1,
+    let text = text.trim();
+    let digits = text.find(|sign: char| !sign.is_ascii_digit()).unwrap_or(text.len());
+    let unit = match text[digits..].trim().to_ascii_uppercase().trim_end_matches('B') {
+        "" => Some(1),
+        "K" => Some(1_000),
+        "M" => Some(1_000_000),
+        "G" => Some(1_000_000_000),
+        "KI" => Some(1 << 10),
+        "MI" => Some(1 << 20),
+        "GI" => Some(1 << 30),
+        _ => None,
     };
-    let digits = if unit == 1 { text } else { &text[..text.len() - 1] };
-    let number: Option<u64> = digits.trim().parse().ok();
+    let number: Option<u64> = text[..digits].parse().ok();
     number
-        .and_then(|number| number.checked_mul(unit))
+        .zip(unit)
+        .and_then(|(number, unit)| number.checked_mul(unit))
         .filter(|bytes| *bytes > 0)
-        .ok_or_else(|| "wanted bytes, as in 512M or 4G".into())
+        .ok_or_else(|| "wanted bytes, as in 512M, 4G or 4GiB".into())
 }
 
 /// What the columns of foreign files mean.
@@ -119,6 +124,10 @@ impl Mapping {
             } else {
                 naming.add(entry).map_err(|e| crate::Failure::input(format!("--map: {e}")))?;
             }
+        }
+        for (channel, column) in naming.taken_from(&filed) {
+            let what = "another channel has by --map: it is not read";
+            output::tell(format_args!("warning: {channel} is `{column}` in the campaign.toml, which {what}"));
         }
         Ok(naming.over(&filed))
     }
@@ -180,7 +189,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "RECORDING")]
         holdout: Vec<PathBuf>,
         /// Seconds to drop at the start of each recording; a campaign.toml says that itself
-        #[arg(long, value_name = "SECONDS")]
+        #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
         settle: Option<f64>,
         /// Two channels that read a sine and a cosine, and no gyroscope: instrument = "sensor", with a period of 360°
         #[arg(long)]
@@ -232,8 +241,7 @@ pub(crate) enum Command {
         /// Recordings (CSV, Parquet, .mat, HDF5); patterns like 'rot*.csv'; - for standard input
         #[arg(required = true, value_name = "RECORDING")]
         recordings: Vec<PathBuf>,
-        /// File for the compensated recording (CSV, or Parquet where the name ends in .parquet); a folder for several, which
-        /// keep their names
+        /// File for the compensated recording (.csv or .parquet); a folder for several, which keep their names
         #[arg(long)]
         out: PathBuf,
         /// Name of the instrument of the recordings; refused where the calibration is of another
@@ -287,4 +295,19 @@ pub(crate) enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bytes;
+
+    #[test]
+    fn memory_is_in_bytes_in_thousands_of_them_or_in_powers_of_1024() {
+        let of = ["512", "4K", "512M", "4G", "4GB", "4GiB", "3 KiB", "2mib", "1gi"].map(|text| bytes(text).ok());
+        let wanted = [512, 4_000, 512_000_000, 4_000_000_000, 4_000_000_000, 4 << 30, 3 << 10, 2 << 20, 1 << 30];
+        assert_eq!(of, wanted.map(Some));
+        for text in ["", "0", "G", "4T", "4iB", "4GiBi", "-1", "1.5G", "99999999999G"] {
+            assert!(bytes(text).is_err(), "{text}");
+        }
+    }
 }

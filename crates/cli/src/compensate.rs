@@ -16,17 +16,31 @@ pub(crate) fn compensate(
     naming: &Naming,
 ) -> Result<(), Failure> {
     let files = input::files(recordings)?;
-    // the results of an identification are in a folder
-    let in_results = calibration_file.join("calibration.toml");
-    let calibration_file = if calibration_file.is_dir() { in_results.as_path() } else { calibration_file };
+    let is_toml = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    if let Some(last) =
+        files.iter().find(|file| is_toml(file) && !is_toml(calibration_file) && !calibration_file.is_dir())
+    {
+        let what = "stands in the place of the calibration, which comes first";
+        return Err(Failure::input(format!(
+            "{}: {what}: cvg compensate {} {}",
+            calibration_file.display(),
+            last.display(),
+            calibration_file.display()
+        )));
+    }
+    let calibration_file = &input::calibration(calibration_file);
     let mut inputs = vec![calibration_file.to_owned()];
     inputs.extend(files.iter().cloned());
     let targets = targets(&files, out)?;
     for target in &targets {
         output::check_file(target, &inputs)?;
+        if !is_table(target) {
+            let what = format!("--out {}: wanted a name that ends in .csv or .parquet", target.display());
+            return Err(Failure::input(what));
+        }
     }
     let calibration = Calibration::read(calibration_file)?;
-    if let Some(campaign) = files.iter().find(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))) {
+    if let Some(campaign) = files.iter().find(|file| is_toml(file)) {
         let what = "is a campaign; wanted its recordings, one after the other, with what its [columns] say by --map";
         return Err(Failure::input(format!("{}: {what}", campaign.display())));
     }
@@ -50,13 +64,17 @@ pub(crate) fn compensate(
     Ok(())
 }
 
+/// A name of what is written here.
+fn is_table(file: &Path) -> bool {
+    file.extension().is_some_and(|e| ["csv", "parquet"].iter().any(|name| e.eq_ignore_ascii_case(name)))
+}
+
 /// Where each recording goes.
 fn targets(files: &[PathBuf], out: &Path) -> Result<Vec<PathBuf>, Failure> {
     if let [_] = files {
         return Ok(vec![out.to_owned()]);
     }
-    let is_file = out.extension().is_some_and(|e| ["csv", "parquet"].iter().any(|name| e.eq_ignore_ascii_case(name)));
-    if is_file && !out.is_dir() {
+    if is_table(out) && !out.is_dir() {
         let what = format!("{}: {} recordings do not go into one file; wanted a folder", out.display(), files.len());
         return Err(Failure::input(what));
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, Role, mapped_name};
 
-use crate::Failure;
+use crate::{Failure, report_keys};
 
 /// What standard input is called in messages.
 const STANDARD_INPUT: &str = "standard input";
@@ -87,6 +87,11 @@ pub(crate) fn files(names: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 fn campaign_in(path: &Path) -> PathBuf {
     let campaign = path.join("campaign.toml");
     if campaign.is_file() { campaign } else { path.to_owned() }
+}
+
+/// The calibration in the results of an identification, where a folder is named.
+pub(crate) fn calibration(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("calibration.toml") } else { path.to_owned() }
 }
 
 /// Whether a file is a campaign by its name.
@@ -181,11 +186,23 @@ pub(crate) fn stands_still(recording: &Recording) -> bool {
     table.map_or(rates, |v| v.iter().all(|angle| Some(angle) == v.first() || angle.is_nan()))
 }
 
+/// The column that a misspelt one is nearest to.
+fn near<'a>(misspelt: &str, columns: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let misspelt = misspelt.to_lowercase();
+    let apart = columns.map(|column| (report_keys::apart(&misspelt, &column.to_lowercase()), column));
+    let (apart, column) = apart.min_by_key(|(apart, _)| *apart)?;
+    // a third of the letters and more are another name
+    (3 * apart <= misspelt.chars().count()).then_some(column)
+}
+
 /// What would mend it, where the command line can.
 pub(crate) fn explained(error: ReadError) -> Failure {
-    let (ReadError::MissingColumns { present, .. } | ReadError::MappedColumn { present, .. }) = &error else {
-        return error.into();
-    };
+    if let ReadError::MappedColumn { channel, column, present, .. } = &error {
+        let near = near(column, present.split('`').skip(1).step_by(2));
+        let meant = near.map_or(String::new(), |near| format!("; --map '{channel}={}' is near", mapped_name(near)));
+        return Failure::of_file(format!("{error}{meant}"), &error);
+    }
+    let ReadError::MissingColumns { present, .. } = &error else { return error.into() };
     let there = |name: &str| present.split('`').any(|p| p == name);
     if there("xc_v") && there("yc_v") && there("t_s") {
         let message = format!(
@@ -201,8 +218,14 @@ pub(crate) fn explained(error: ReadError) -> Failure {
     };
     // the first column is the time of nearly every file
     let time = foreign.iter().find(is_time).or(foreign.first()).copied().unwrap_or("Time");
-    let (channel, column) =
-        if there("t_s") { ("theta_deg", foreign.first().copied().unwrap_or("Ch3")) } else { ("t_s", time) };
+    // of two channels, the one that is not there
+    let pairs = [("xc_v", "yc_v"), ("yc_v", "xc_v"), ("x_v", "y_v"), ("y_v", "x_v")];
+    let partner = pairs.iter().find(|(one, other)| there(one) && !there(other)).map(|(_, other)| *other);
+    let (channel, column) = if there("t_s") {
+        (partner.unwrap_or("theta_deg"), foreign.first().copied().unwrap_or("Ch3"))
+    } else {
+        ("t_s", time)
+    };
     let column = mapped_name(column);
     let message = format!(
         "{error}; say which column is which, as in --map '{channel}={column}', or once for all in the [columns] of a \

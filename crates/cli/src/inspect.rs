@@ -30,7 +30,8 @@ pub(crate) fn inspect(
             let campaign = Campaign::open_named(file, naming).map_err(input::explained)?;
             inputs.extend(input::sources(&campaign));
             if !as_json {
-                output::answer(&format!("{}: {}, {} runs\n", file.display(), campaign.device, campaign.runs.len()))?;
+                let runs = output::counted(campaign.runs.len(), "run");
+                output::answer(&format!("{}: {}, {runs}\n", file.display(), campaign.device))?;
                 for w in &campaign.warnings {
                     output::answer(&format!("  warning: {w}\n"))?;
                 }
@@ -193,12 +194,13 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
         RunKind::Virtual => ", virtual precession",
     });
     line(format!("{}{stated}", recording.source.display()));
-    let dropped = d.rows_dropped();
+    let dropped =
+        format!("{} dropped", output::counted(usize::try_from(d.rows_dropped()).unwrap_or(usize::MAX), "row"));
     line(match recording.len() {
-        rows @ 0..2 => format!("  {rows} rows, of which nothing can be told; {dropped} rows dropped"),
+        rows @ 0..2 => format!("  {}, of which nothing can be told; {dropped}", output::counted(rows, "row")),
         rows => format!(
-            "  {rows} rows over {duration:.3} s, one every {interval:.6} s ({:.2} Hz), largest gap {largest:.6} s; {dropped} rows \
-             dropped",
+            "  {rows} rows over {duration:.3} s, one every {interval:.6} s ({:.2} Hz), largest gap {largest:.6} s; \
+             {dropped}",
             1.0 / interval
         ),
     });
@@ -264,5 +266,5 @@ fn draw(recording: &Recording, path: &Path, inputs: &[PathBuf]) -> Result<(), Fa
 
 /// A column's name as its panel has it, with what is missing of it.
 fn named(x: &Summary) -> String {
-    if x.missing == 0 { x.name.clone() } else { format!("{}, {} values missing", x.name, x.missing) }
+    if x.missing == 0 { x.name.clone() } else { format!("{}, {} missing", x.name, output::counted(x.missing, "value")) }
 }

@@ -49,7 +49,7 @@ impl Limits {
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
         let text = read_text(path)
-            .map_err(|e| Failure::within(format!("{name}: cannot be read: {e}; wanted {WANTED}"), &name.to_string()))?;
+            .map_err(|e| Failure::within(format!("--limits {name}: cannot be read: {e}"), &name.to_string()))?;
         Self::of_text(&text, &name.to_string())
     }
 

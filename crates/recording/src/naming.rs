@@ -83,6 +83,16 @@ impl Naming {
         both
     }
 
+    /// The channels that `other` maps and that go without in [`Naming::over`], since this one gives their columns to others; with
+    /// their columns.
+    pub fn taken_from<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = (Channel, &'a str)> {
+        let is_taken = |e: &&Entry| {
+            !self.entries.iter().any(|own| own.channel == e.channel)
+                && self.entries.iter().any(|own| own.column.eq_ignore_ascii_case(&e.column))
+        };
+        other.entries.iter().filter(is_taken).map(|e| (e.channel, e.column.as_str()))
+    }
+
     /// The channel of a column.
     pub(super) fn channel(&self, name: &str) -> Option<Channel> {
         let name = name.trim();
@@ -191,6 +201,20 @@ mod tests {
         ] {
             assert!(naming.add(text).is_err_and(|e| e.contains(of)), "{text}: {:?}", naming.add(text));
         }
+    }
+
+    #[test]
+    fn a_channel_whose_column_goes_to_another_is_told() {
+        let naming = |entries: &[&str]| {
+            let mut naming = Naming::default();
+            entries.iter().for_each(|entry| assert_eq!(naming.add(entry), Ok(())));
+            naming
+        };
+        let filed = naming(&["t_s=Time", "vas_v=PID1", "vqc_v=PID2"]);
+        let taken = |entries: &[&str]| naming(entries).taken_from(&filed).map(|(c, _)| c.name()).collect::<Vec<_>>();
+        assert_eq!(taken(&["vas_v=PID2"]), ["vqc_v"]);
+        assert_eq!(taken(&["vas_v=PID2", "vqc_v=PID1"]), [""; 0]);
+        assert_eq!(taken(&["vas_v=PID3"]), [""; 0]);
     }
 
     #[test]

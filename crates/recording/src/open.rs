@@ -69,7 +69,7 @@ impl Recording {
         if utf_16::is_one(bytes) {
             return csv::read(utf_16::Decoding::new(bytes), None, Naming::NONE, source);
         }
-        refuse_other_kinds(&bytes[..bytes.len().min(4)], source)?;
+        refuse_other_kinds(&bytes[..bytes.len().min(HEAD as usize)], source)?;
         csv::read(bytes, Some(bytes.len() as u64), Naming::NONE, source)
     }
 }
@@ -127,6 +127,20 @@ fn whole(head: Vec<u8>, rest: impl Read, source: &Path) -> Result<Vec<u8>, ReadE
     Ok(bytes)
 }
 
+/// What a text is that begins as no table does: a report, for people or for programs.
+fn written_page(head: &[u8]) -> Option<&'static str> {
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let begins = |with: &str| text.get(..with.len()).is_some_and(|start| start.eq_ignore_ascii_case(with.as_bytes()));
+    match text {
+        // a line of an instrument may begin with one and go on
+        [b'{', b'\r' | b'\n', ..] => Some("is JSON and no recording"),
+        _ if ["<!doctype", "<html", "<?xml", "<svg"].iter().any(|start| begins(start)) => {
+            Some("is HTML or XML and no recording")
+        }
+        _ => None,
+    }
+}
+
 fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {
     let refuse =
         |what: &str| Err(ReadError::Format { path: path.to_path_buf(), what: what.to_owned(), wanted: WANTED });
@@ -138,6 +152,9 @@ fn refuse_other_kinds(magic: &[u8], path: &Path) -> Result<(), ReadError> {
     }
     if magic.starts_with(b"\x89HDF") {
         return refuse("begins like HDF5 and is none");
+    }
+    if let Some(what) = written_page(magic) {
+        return refuse(what);
     }
     let is_named_parquet = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"));
     if is_named_parquet && !magic.is_empty() {

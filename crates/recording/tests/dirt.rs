@@ -304,6 +304,10 @@ fn numbers_without_a_header_are_refused() {
 #[test]
 fn other_kinds_of_file_are_refused_by_their_name() {
     assert!(refusal(b"PK\x03\x04").contains("spreadsheet"));
+    assert!(refusal("{\n  \"schema\": \"cvg.report/2\"\n}\n").contains("is JSON and no recording"));
+    for page in ["<!DOCTYPE html>\n<html></html>\n", "\n<HTML>\n", "<?xml version=\"1.0\"?>\n<a/>\n"] {
+        assert!(refusal(page).contains("is HTML or XML and no recording"), "{page}");
+    }
     assert!(refusal("t_s,xc_v,yc_v\r0,1,0\r").contains("carriage returns"));
 }
 

@@ -250,5 +250,7 @@ fn recordings_of_one_folder_are_a_campaign_named_after_it() {
     };
     let campaign = Campaign::of_recordings(vec![recording("a.csv"), recording("b.csv")]).unwrap();
     assert_eq!((campaign.device.as_str(), campaign.runs.len()), ("dfp-7", 2));
-    assert_eq!(Campaign::of_recordings(vec![recording("a.csv")]).unwrap().device, "a");
+    for file in ["a.csv", "a.csv.gz", "a.gz"] {
+        assert_eq!(Campaign::of_recordings(vec![recording(file)]).unwrap().device, "a", "{file}");
+    }
 }

@@ -15,7 +15,7 @@ use cvg_calibration::{Hypothesis, Member};
 use cvg_model::effects::{Inverse, Stage};
 
 use crate::report::WHOLE_TURN_RAD;
-use crate::{Failure, output};
+use crate::{Failure, input, output};
 
 /// Points of a period at which a table is checked, for each of its own.
 const CHECKED: usize = 16;
@@ -48,7 +48,8 @@ impl Form {
 
 /// Writes the header, the module where the name ends in `.rs`, or the table where it ends in `.csv`.
 pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: Option<usize>) -> Result<(), Failure> {
-    let inputs: [PathBuf; 1] = [calibration_file.to_owned()];
+    let calibration_file = &input::calibration(calibration_file);
+    let inputs: [PathBuf; 1] = [calibration_file.clone()];
     output::check_file(out, &inputs)?;
     let form = Form::of(out)?;
     if let Some(points) = points.filter(|points| !(8..=65_536).contains(points)) {
@@ -60,6 +61,10 @@ pub(crate) fn firmware(calibration_file: &Path, out: &Path, points: Option<usize
         return Err(Failure::input(format!("{}: {}", calibration_file.display(), of_a_rate_gyroscope(h))));
     }
     if h.instrument != Instrument::Sensor {
+        if let Some(points) = points {
+            let what = "is of a table, and the settings of a gyroscope's electronics have none";
+            return Err(Failure::input(format!("--points {points}: {what}")));
+        }
         let left_out: Vec<String> = gyroscope::left_out(&calibration).into_iter().map(with_values).collect();
         let text = gyroscope::text(&calibration, &left_out, form)?;
         if !left_out.is_empty() {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use cvg_calibration::Options;
-use cvg_calibration::recording::{Campaign, Lake, Naming};
+use cvg_calibration::recording::{Campaign, Lake, Naming, stem};
 use cvg_calibration::report::refused::About;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -47,6 +47,9 @@ pub(super) fn sources(names: &[PathBuf]) -> Result<Vec<Source>, Failure> {
     let mut out = Vec::new();
     for path in files(names)? {
         if !path.is_dir() {
+            if !path.exists() {
+                return Err(Failure::input(format!("{}: there is no such file or folder", path.display())));
+            }
             let lake = if path.is_file() { Lake::open(&path).map_err(explained)? } else { None };
             out.push(lake.map_or_else(|| Source::File(path), Source::Lake));
             continue;
@@ -116,7 +119,7 @@ struct Folders(BTreeSet<String>);
 impl Folders {
     /// The name of the campaign's own folder, or of its file.
     fn of_file(&mut self, path: &Path) -> String {
-        let named = path.file_stem().filter(|s| *s != "campaign").or_else(|| path.parent()?.file_name());
+        let named = stem(path).filter(|s| *s != "campaign").or_else(|| path.parent()?.file_name());
         self.free(named.map_or("device".into(), |n| n.to_string_lossy().into_owned()))
     }
 
@@ -217,11 +220,17 @@ mod tests {
 
     #[test]
     fn no_two_campaigns_share_a_folder_of_results() {
-        let paths =
-            ["a/unit/campaign.toml", "b/unit/campaign.toml", "c/unit-2/campaign.toml", "unit.toml", "unit-2.toml"];
+        let paths = [
+            "a/unit/campaign.toml",
+            "b/unit/campaign.toml",
+            "c/unit-2/campaign.toml",
+            "unit.toml",
+            "unit-2.toml",
+            "ring.csv.gz",
+        ];
         let mut folders = Folders::default();
         let names = paths.map(|path| folders.of_file(Path::new(path)));
-        assert_eq!(names, ["unit", "unit-2", "unit-2-2", "unit-3", "unit-2-3"]);
+        assert_eq!(names, ["unit", "unit-2", "unit-2-2", "unit-3", "unit-2-3", "ring"]);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value, json};
 
+use crate::output;
 use crate::population::{Change, Device, Line, Oddity, Population};
 use crate::report::fleet as page;
 use crate::report::numbers::significant;
@@ -80,7 +81,7 @@ fn oddity(odd: &Oddity) -> Value {
 pub(super) fn in_words(population: &Population, devices: &[Device]) -> String {
     let mut out = String::new();
     let answered = population.answered;
-    let _ = writeln!(out, "{} devices, {answered} answered", devices.len());
+    let _ = writeln!(out, "{}, {answered} answered", output::counted(devices.len(), "device"));
     for (name, d) in population.distributions.iter().filter(|(_, d)| 2 * d.count > answered) {
         let unit = if d.unit == "1" { "" } else { &d.unit };
         let (middle, deviation) = (significant(d.median), significant(d.deviation));
@@ -95,7 +96,8 @@ pub(super) fn in_words(population: &Population, devices: &[Device]) -> String {
             let _ = writeln!(out, "  {name}: {}", page::in_words(line, change, devices));
         }
         if line.group > 0 {
-            let _ = writeln!(out, "  {name}: {} devices are apart from the others: too many to be odd", line.group);
+            let _ =
+                writeln!(out, "  {name}: {} apart from the others: too many to be odd", page::devices_are(line.group));
         }
     }
     for (device, odd) in devices.iter().zip(&population.odd).filter(|(_, odd)| !odd.is_empty()) {

@@ -47,7 +47,8 @@ pub(crate) fn fleet(names: &[PathBuf], out: &Path, asked: &Asked<'_>) -> Result<
     let [table, facts, page, results] = SUMMARIES;
     output::check_folder_for(out, &[table, facts, page, results, PRIOR], &inputs)?;
     let progress = Progress::begin();
-    progress.say(&format!("identifying {} devices", sources.iter().map(devices::Source::count).sum::<usize>()));
+    let count = sources.iter().map(devices::Source::count).sum::<usize>();
+    progress.say(&format!("identifying {}", output::counted(count, "device")));
     let rows = devices::answered(sources, out, asked.limits)?;
     drop(progress);
     let told = summarised(&rows, out, &inputs, asked.prior)?;
@@ -57,7 +58,9 @@ pub(crate) fn fleet(names: &[PathBuf], out: &Path, asked: &Asked<'_>) -> Result<
         return Err(Failure::no_answer("no device of the fleet has an answer"));
     }
     if outside > 0 {
-        return Err(Failure::no_answer(format!("{outside} of {} devices are outside their limits", rows.len())));
+        let are = if outside == 1 { "is outside its" } else { "are outside their" };
+        let of = output::counted(rows.len(), "device");
+        return Err(Failure::no_answer(format!("{outside} of {of} {are} limits")));
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use crate::Failure;
 
 pub(crate) use self::place::{check_file, check_folder, check_folder_for};
 pub(crate) use self::set::Set;
-pub(crate) use self::words::plain;
+pub(crate) use self::words::{counted, plain};
 
 /// Prints a result to standard output. A reader that has gone away has read what it wanted.
 pub(crate) fn answer(text: &str) -> Result<(), Failure> {

@@ -16,8 +16,16 @@ const UNFINISHED: &str = ".cvg-new.";
 /// How long another program may take to write what it has.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
+/// `-` is standard input where something is read; results have a name.
+fn no_stream(path: &Path) -> Result<(), Failure> {
+    let is_stream = path.as_os_str() == "-";
+    let what = "-: results do not go to standard output; wanted a name, or ./- for one of that name";
+    if is_stream { Err(Failure::input(what)) } else { Ok(()) }
+}
+
 /// A folder for results is one, or can become one: asked before the work is done.
 pub(crate) fn check_folder(folder: &Path) -> Result<(), Failure> {
+    no_stream(folder)?;
     // a bar at the end would be a way through a link
     let named: PathBuf = folder.components().collect();
     let Ok(metadata) = fs::symlink_metadata(named) else { return Ok(()) };
@@ -36,6 +44,7 @@ pub(crate) fn check_folder_for(folder: &Path, names: &[&str], inputs: &[PathBuf]
 
 /// A file may be written where none is, or where a plain file is that is no input.
 pub(crate) fn check_file(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    no_stream(path)?;
     let Ok(metadata) = fs::symlink_metadata(path) else { return Ok(()) };
     if !metadata.is_file() {
         let what = kind(&metadata);

@@ -20,6 +20,11 @@ pub(crate) fn plain(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
+/// A number of things by the name of one: `1 run`, `2 runs`.
+pub(crate) fn counted(count: usize, one: &str) -> String {
+    format!("{count} {one}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Whether a sign is an instruction rather than one to be shown: controls but for the end of a line and the tab, and
 /// what turns the direction of writing.
 fn steers(sign: char) -> bool {
@@ -29,7 +34,12 @@ fn steers(sign: char) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::plain;
+    use super::{counted, plain};
+
+    #[test]
+    fn one_is_no_many() {
+        assert_eq!([0, 1, 2].map(|n| counted(n, "run")), ["0 runs", "1 run", "2 runs"]);
+    }
 
     #[test]
     fn what_steers_a_terminal_is_written_as_its_number() {

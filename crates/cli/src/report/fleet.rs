@@ -9,6 +9,7 @@ use super::numbers::significant;
 use super::tables::{row, table};
 use super::{begin, draw, escape, finish};
 use crate::Failure;
+use crate::output::counted;
 use crate::population::{Change, Device, Line, Oddity, Population};
 
 /// Ordinary devices in one figure; the odd ones are all there.
@@ -27,7 +28,7 @@ pub(crate) fn page(population: &Population, devices: &[Device], facts: &Value) -
         .filter_map(|(number, (name, line))| course(number, name, line, population, devices))
         .collect();
     let mut h = String::with_capacity(2 << 20);
-    begin(&mut h, &format!("{} devices", devices.len()), "fleet");
+    begin(&mut h, &counted(devices.len(), "device"), "fleet");
     headline(&mut h, population, devices);
     if let Some(prior) = facts["prior"]["statement"].as_str() {
         let _ = write!(h, "<p>{}: {}.</p>", escape(facts["prior"]["file"].as_str().unwrap_or_default()), escape(prior));
@@ -115,7 +116,7 @@ fn quantities(h: &mut String, population: &Population, devices: &[Device]) {
             let Some(spread) = &line.spread else { continue };
             let change = line.change.as_ref().map_or("—".to_owned(), |c| in_words(line, c, devices));
             let group =
-                if line.group > 0 { format!("; {} devices are apart as a group", line.group) } else { String::new() };
+                if line.group > 0 { format!("; {} apart as a group", devices_are(line.group)) } else { String::new() };
             let outside =
                 line.chart.map_or("—".to_owned(), |c| format!("{}, longest run {}", c.outside, c.longest_run));
             let brief = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.2e}") };
@@ -130,6 +131,11 @@ fn quantities(h: &mut String, population: &Population, devices: &[Device]) {
             row(h, &cells.each_ref().map(String::as_str));
         }
     });
+}
+
+/// A number of devices, and the verb.
+pub(crate) fn devices_are(count: usize) -> String {
+    format!("{} {}", counted(count, "device"), if count == 1 { "is" } else { "are" })
 }
 
 /// What changes along the serial numbers.

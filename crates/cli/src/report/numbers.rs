@@ -1,5 +1,6 @@
 //! Numbers as a person says them: as sharp as they are known, in the unit that the bench counts in.
 
+use cvg_calibration::report::named::BESIDE_THE_LIBRARY;
 use cvg_calibration::report::{EffectReport, Estimate, ParameterReport};
 use cvg_model::effects::{EffectId, Stage};
 
@@ -7,6 +8,8 @@ use cvg_model::effects::{EffectId, Stage};
 pub(crate) const LEAST_DEG: f64 = 1e-6;
 /// In the place of a number that the recordings do not carry.
 pub(crate) const NOT_IDENTIFIABLE: &str = "not identifiable from this campaign";
+/// An error that changed by less than this share is as it was: two digits of a factor show no less.
+const AS_IT_WAS: f64 = 0.005;
 /// Sizes that are written without an exponent.
 const PLAIN: std::ops::Range<f64> = 1e-3..1e7;
 
@@ -126,6 +129,10 @@ pub(crate) fn times(before: f64, after: f64) -> String {
     let factor = before / after;
     if !factor.is_finite() {
         "no factor".into()
+    } else if (factor - 1.0).abs() < AS_IT_WAS {
+        "as it was".into()
+    } else if factor < 1.05 {
+        format!("{factor:.2} times less")
     } else if factor >= 10.0 {
         format!("{factor:.0} times less")
     } else {
@@ -143,10 +150,12 @@ pub(crate) struct Shown<'a> {
 
 impl<'a> Shown<'a> {
     pub(crate) fn of(e: &EffectReport, p: &'a ParameterReport) -> Self {
-        let of_the_input = EffectId::from_id(&e.id).is_some_and(|id| id.description().stage == Stage::Input);
+        let beside = BESIDE_THE_LIBRARY.iter().any(|b| b.id == e.id && b.stage == "input");
+        let of_the_input = beside || EffectId::from_id(&e.id).is_some_and(|id| id.description().stage == Stage::Input);
         let (factor, unit) = match p.unit.as_str() {
             "rad" => (1f64.to_degrees(), "deg"),
             "rad/s" if of_the_input => (1f64.to_degrees(), "deg/s"),
+            "rad/s/K" if of_the_input => (1f64.to_degrees(), "deg/s/K"),
             unit => (1.0, unit),
         };
         Self { name: &p.name, value: factor * p.value, ci95: p.ci95.map(|c| c.map(|v| factor * v)), unit }
@@ -194,6 +203,10 @@ mod tests {
         assert_eq!(times(0.27, 0.0011), "245 times less");
         assert_eq!(times(0.3, 0.1), "3.0 times less");
         assert_eq!(times(0.3, 0.0), "no factor");
+        assert_eq!(
+            [times(0.3, 0.29), times(0.3, 0.3), times(0.3, 0.299)],
+            ["1.03 times less", "as it was", "as it was"]
+        );
     }
 
     #[test]
@@ -212,6 +225,7 @@ mod tests {
             Shown::of(&e, &p).in_words()
         };
         assert_eq!(of("rate-offset", "rad/s"), "p = 0.573 ± 0.057 deg/s");
+        assert_eq!(of("rate-offset-temperature", "rad/s/K"), "p = 0.573 ± 0.057 deg/s/K");
         assert_eq!(of("anisoelasticity", "rad/s"), "p = 0.0100 ± 0.0010 rad/s");
         assert_eq!(of("angle-harmonic", "rad"), "p = 0.573 ± 0.057 deg");
         assert_eq!(of("detection-skew", "1"), "p = 0.0100 ± 0.0010");

@@ -207,7 +207,7 @@ impl Campaign {
     pub fn of_recordings_as(recordings: Vec<Recording>, instrument: Instrument) -> Result<Self, ReadError> {
         let sources: Vec<PathBuf> = recordings.iter().map(|r| r.source.clone()).collect();
         let name = match sources.as_slice() {
-            [one] => one.file_stem().map(OsStr::to_owned),
+            [one] => stem(one).map(OsStr::to_owned),
             [first, ..] => std::path::absolute(first).ok().and_then(|p| Some(p.parent()?.file_name()?.to_owned())),
             [] => None,
         };
@@ -384,6 +384,14 @@ impl Campaign {
         }
         text
     }
+}
+
+/// The name of a file without what says how it is written: `encoder` of `encoder.csv` and of `encoder.csv.gz`.
+#[must_use]
+pub fn stem(path: &Path) -> Option<&OsStr> {
+    let stem = path.file_stem()?;
+    let is_packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    Path::new(stem).file_stem().filter(|_| is_packed).or(Some(stem))
 }
 
 fn quoted(text: &str) -> String {
