@@ -47,10 +47,12 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     headline(&mut h, identified);
     warnings(&mut h, &r.warnings);
     stages(&mut h, identified);
-    h.push_str(
+    let standard = if tables::has_standard(r) { "<a href=\"#standard\">IEEE 1431</a>" } else { "" };
+    let _ = write!(
+        h,
         "<nav aria-label=\"sections\"><a href=\"#effects\">Effects</a><a href=\"#parameters\">Parameters</a><a \
-         href=\"#look\">Figures</a><a href=\"#runs\">Runs</a><a href=\"#left\">What is left</a><a href=\"#standard\">IEEE 1431</a><a \
-         href=\"#files\">Files</a></nav></header><main>",
+         href=\"#look\">Figures</a><a href=\"#runs\">Runs</a><a href=\"#left\">What is left</a>{standard}<a \
+         href=\"#files\">Files</a></nav></header><main>"
     );
     let still = clouds::bias_svg(identified, STILL_POINTS, true)?;
     let without = "<p>The figures need scripts, which this file brings along; here is one without.</p>";

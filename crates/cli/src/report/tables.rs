@@ -34,6 +34,16 @@ pub(super) fn has_pattern(identified: &Identification) -> bool {
     identified.report.instrument == "gyroscope" && !is_rate_gyroscope(identified)
 }
 
+/// A sensor has none of what the standard of gyroscopes speaks of.
+pub(super) fn has_standard(r: &Report) -> bool {
+    r.instrument == "gyroscope"
+}
+
+/// A word of the facts as a reader of this instrument has it: what has no pattern has an angle.
+fn said_of(word: &str, has_pattern: bool) -> String {
+    if has_pattern { word.to_owned() } else { word.replace("pattern angle", "angle").replace("pattern", "angle") }
+}
+
 /// What was found: before the figures.
 pub(super) fn found(h: &mut String, identified: &Identification) {
     let declared = if has_pattern(identified) {
@@ -54,8 +64,10 @@ pub(super) fn besides(h: &mut String, identified: &Identification) {
     temperature(h, r.temperature.as_ref());
     correlations(h, identified);
     steps(h, identified);
-    left(h, r);
-    words(h, r, has_pattern(identified));
+    left(h, r, has_pattern(identified));
+    if has_standard(r) {
+        words(h, r, has_pattern(identified));
+    }
     files(h, r);
 }
 
@@ -258,10 +270,10 @@ fn steps(h: &mut String, identified: &Identification) {
     });
 }
 
-fn left(h: &mut String, r: &Report) {
+fn left(h: &mut String, r: &Report, has_pattern: bool) {
     let memory = if r.residual.white { "no memory" } else { "some memory" };
     let _ = write!(h, "<h2 id=\"left\">What is left</h2><p>Ljung–Box at 1 %: {memory} in the residual.</p>");
-    shares(h, r);
+    shares(h, r, has_pattern);
     if r.unexplained.is_empty() {
         h.push_str("<p>Nothing that asks for an explanation.</p>");
     } else {
@@ -270,7 +282,16 @@ fn left(h: &mut String, r: &Report) {
             for u in &r.unexplained {
                 let n = u.n.map_or("—".into(), |n| n.to_string());
                 let f = u.frequency_hz.map_or("—".into(), |f| format!("{f:.5}"));
-                row(h, &[&escape(&u.class), &n, &f, &format!("{:.5}", u.rms_deg), &escape(&u.suggestion)]);
+                row(
+                    h,
+                    &[
+                        &escape(&said_of(&u.class, has_pattern)),
+                        &n,
+                        &f,
+                        &format!("{:.5}", u.rms_deg),
+                        &escape(&u.suggestion),
+                    ],
+                );
             }
         });
     }
@@ -290,7 +311,7 @@ fn left(h: &mut String, r: &Report) {
     let columns = ["of", "n", "amplitude [deg]", "95 % of a component [deg]", "phase [deg]"];
     table(h, "Harmonics of the residual", &columns, |h| {
         for x in &r.residual.harmonics {
-            let of = format!("{:?}", x.of).to_lowercase();
+            let of = said_of(&format!("{:?}", x.of).to_lowercase(), has_pattern);
             let amplitude = format!("{:.6}", x.amplitude_deg);
             let interval = format!("± {:.6}", x.ci95_deg);
             row(h, &[&of, &x.n.to_string(), &amplitude, &interval, &format!("{:.0}", x.phase_deg)]);
@@ -310,14 +331,15 @@ fn followed(share: &Share) -> String {
 }
 
 /// What the error that the declared model leaves is a function of.
-fn shares(h: &mut String, r: &Report) {
+fn shares(h: &mut String, r: &Report, has_pattern: bool) {
     if r.decomposition.is_empty() {
         return;
     }
     table(h, "What the declared model's residual follows", &["it follows", "share of its variance", "95 %"], |h| {
         for s in &r.decomposition {
             let [low, high] = s.ci95.map(|v| format!("{:.1} %", 100.0 * v));
-            row(h, &[&escape(&followed(s)), &format!("{:.1} %", 100.0 * s.share), &format!("{low} … {high}")]);
+            let followed = said_of(&followed(s), has_pattern);
+            row(h, &[&escape(&followed), &format!("{:.1} %", 100.0 * s.share), &format!("{low} … {high}")]);
         }
     });
 }
