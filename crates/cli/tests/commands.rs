@@ -75,6 +75,28 @@ fn the_demo_of_self_calibration_ends_with_a_small_error_and_says_what_rest_canno
     assert!(bias(last) < bias(first) / 100.0, "{first:?} {last:?}");
     assert!((last[3].parse::<f64>().unwrap() - DETECTION_RATIO).abs() < 1e-4, "{last:?}");
     assert!(fs::read_to_string(out.join("self-calibration.svg")).unwrap().contains("<svg"));
+    // the page has the table that is printed, some of its rows and a digit less
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/self-calibration.md"));
+    let of_page = page.unwrap();
+    let of_page =
+        of_page.lines().skip_while(|line| !line.starts_with("| until |")).skip(3).take_while(|l| l.starts_with('|'));
+    let of_page: Vec<Vec<&str>> = of_page.map(|line| line.split('|').map(str::trim).collect()).collect();
+    assert!(of_page.len() >= 5, "{of_page:?}");
+    assert!(said.contains("uncompensated     271.98 mdeg"), "as the page has it before: {said}");
+    for row in of_page {
+        let [_, until, doing, bias_mdeg, ratio, _] = row.as_slice() else { panic!("{row:?}") };
+        let second = until.strip_suffix(" s").unwrap();
+        let printed = rows.iter().find(|r| r[0] == second).unwrap_or_else(|| panic!("no row {second}"));
+        let told = bias_mdeg.strip_suffix(" mdeg").unwrap().parse::<f64>().unwrap();
+        assert!((1e3 * bias(printed) - told).abs() < 0.06 && printed[1] == *doing, "{row:?}: {printed:?}");
+        let known = printed[5] == "true";
+        let number = |at: usize| printed[at].parse::<f64>().unwrap();
+        let estimate = ratio.split_once(" ± ").map(|both| [both.0, both.1].map(|text| text.parse::<f64>().unwrap()));
+        assert_eq!((estimate.is_some(), *ratio == "not known"), (known, !known), "{row:?}: {printed:?}");
+        if let Some([value, half]) = estimate {
+            assert!((value - number(3)).abs() < 1e-5 && (half - 1.96 * number(4)).abs() < 1e-5, "{row:?}: {printed:?}");
+        }
+    }
 }
 
 #[test]

@@ -65,6 +65,17 @@ fn the_python_of_the_page_reads_a_report_and_a_refusal() {
         said.contains(" deg -> ") && said.contains("gain ratio 1.") && said.contains("detection-gain-mismatch"),
         "{said}"
     );
+    // a sensor without a reference has no error to tell
+    let rows = (0..2000).map(|i| f64::from(i) * 0.01).map(|t| {
+        let (sin, cos) = (1.3 * t).sin_cos();
+        format!("{t:.2},{:.4},{:.4}\n", cos + 0.05, 1.02 * sin)
+    });
+    bench.write("hall.csv", format!("t_s,xc_v,yc_v\n{}", rows.collect::<String>()));
+    let (hall, alone) = (bench.path("hall.csv"), bench.path("alone"));
+    cvg_ok(&[OsStr::new("identify"), hall.as_os_str(), "--sensor".as_ref(), "--out".as_ref(), alone.as_os_str()]);
+    let surveyed = read("alone/report.json").unwrap();
+    let said = String::from_utf8(surveyed.stdout).unwrap();
+    assert!(surveyed.status.success() && said.contains("nan deg -> nan deg"), "{said}");
     bench.write("refused.json", r#"{"status": "refused", "reason": "too short", "device": "d"}"#);
     let refused = read("refused.json").unwrap();
     assert_eq!(refused.status.code(), Some(1));
