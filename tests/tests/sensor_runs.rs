@@ -170,6 +170,23 @@ fn a_drift_is_not_taken_for_a_lag_behind_the_acceleration_where_a_swing_is_harmo
 }
 
 #[test]
+fn an_error_behind_the_acceleration_is_said_at_its_size_and_not_to_be_carried() {
+    // swings that quicken: no function of the position
+    let table = |t: f64| 300.0 * (0.6 * t + 0.06 * t * t).sin();
+    let acceleration = |t: f64| (table(t + 1e-3) - 2.0 * table(t) + table(t - 1e-3)) / 1e-6;
+    let lag_s2 = 4e-4;
+    let mut recording = read(BUILT, |t| table(t) - lag_s2 * acceleration(t), None, 1.0, 1);
+    recording.table_deg = Some(recording.t_s.iter().map(|t| table(*t)).collect());
+    let all: Vec<f64> = recording.t_s.iter().take(3000).map(|t| lag_s2 * acceleration(*t)).collect();
+    let rms = (all.iter().map(|e| e * e).sum::<f64>() / all.len() as f64).sqrt();
+    let i = of_runs(vec![run("swing.csv", Role::Fit, recording)]);
+    assert!(holds(&i, "acceleration-lag", 0, lag_s2), "{:#?}", i.report.effects);
+    let said = i.report.unexplained.iter().find(|u| u.suggestion.contains("acceleration")).unwrap();
+    assert!((said.rms_deg / rms - 1.0).abs() < 0.1, "{} of {rms}°", said.rms_deg);
+    assert!(said.suggestion.contains("not carried into the calibration"), "{}", said.suggestion);
+}
+
+#[test]
 fn a_sensor_that_is_late_is_compensated_without_a_reference_by_the_rate_of_its_own_angle() {
     let late = |seed| {
         let mut recording = read(BUILT, |t| there_and_back(t - 0.01), None, -1.0, seed);

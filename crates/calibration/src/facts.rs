@@ -50,7 +50,7 @@ pub struct Harmonic {
 pub enum Status {
     /// the instrument was identified, and undoing what was found helps on held-out data
     Answered,
-    /// nothing that was found helps on held-out data: compensating changes nothing
+    /// what was found leaves more of the held-out error than nothing does, of a gyroscope beyond chance: compensating changes nothing
     Neutral,
     /// the campaign does not carry an answer
     Refused,
@@ -158,7 +158,7 @@ pub struct ParameterReport {
     pub unit: String,
     /// value
     pub value: f64,
-    /// 95 % interval; null for a parameter set by a search
+    /// 95 % interval; null for what a search set, and where none could be shown to hold
     pub ci95: Option<[f64; 2]>,
 }
 
@@ -335,9 +335,9 @@ pub struct Unexplained {
 pub struct RunReport {
     /// file
     pub file: String,
-    /// rotation, or ring-down
+    /// rotation, ringdown, static, decay, virtual or cross-axis
     pub kind: String,
-    /// fit, holdout or both
+    /// fit; fit, last quarter held out; holdout; at rest; misalignment; or left out
     pub r#use: String,
     /// rows read
     pub rows: usize,
@@ -439,9 +439,11 @@ pub struct DecayReport {
     pub damping_per_s: Estimate,
     /// τ, s
     pub tau_s: Estimate,
-    /// precession of the pattern by the input rotation, θ̇ = −kΩ, at the rate of the runs, deg/h; not told where that is not one
+    /// precession of the pattern by the input rotation, θ̇ = −kΩ, at the rate of the runs, deg/h; null, and not a number here, where that is not one
+    #[serde(with = "told")]
     pub precession_dph: Estimate,
     /// the same under the paper's model alone
+    #[serde(with = "told")]
     pub precession_dph_declared: Estimate,
     /// frequency of the vibration, Hz, mean over the runs; null where the recordings are envelopes
     pub carrier_hz: Option<f64>,

@@ -23,6 +23,7 @@ const ROUTINE: &[&str] = &[
     "the reference was commanded and not measured",
     "are separated by a run that no other bears out",
     "samples were set aside as spikes",
+    "sample was set aside as a spike",
 ];
 
 /// Rows of a run: more of them take longer and show no more.

@@ -25,7 +25,7 @@ use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
-use crate::report::recorded::run_report;
+use crate::report::recorded::{run_report, set_aside};
 use crate::report::stages::stages;
 use crate::report::unexplained::{against_a_command, left_over, residual_report};
 use crate::report::{
@@ -200,9 +200,7 @@ pub(crate) fn report(
     let mut warnings = head.warnings.clone();
     warnings.extend(finding.warnings.iter().cloned());
     let spikes = errors.spikes(fitted.iter().chain(held).map(|r| r.number));
-    if spikes > 0 {
-        warnings.push(format!("{spikes} samples were set aside as spikes"));
-    }
+    warnings.extend(set_aside(spikes, "sample"));
     let heldout = errors.heldout(held);
     if finding.instrument == Instrument::Sensor {
         warnings.extend(left_over(&heldout));
@@ -215,7 +213,7 @@ pub(crate) fn report(
         runs(&head, &finding, [fitted, held], [&errors.on_fit, discovered], &mut warnings);
     let angular_gain = covering_all(&finding, &odd, &mut reported, &mut warnings);
     let residual = residual_report(&errors.on_fit, discovered);
-    let mut unexplained = described(&effects, &finding);
+    let mut unexplained = described(&effects, &finding, fitted);
     if finding.readout.is_some() && fitted.iter().all(|run| run.commanded) {
         unexplained.extend(against_a_command(&residual));
     }
@@ -342,8 +340,12 @@ fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64) -> &'static s
     }
 }
 
-/// What was corrected without a known cause, of a sensor with so many periods a turn.
-fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained> {
+/// What is said of an error that a recording without a reference does not tell.
+const BY_ACCELERATION: &str = "corrected as an error in proportion to the acceleration on these data, as a tracking loop makes; it is not \
+                               carried into the calibration, and a compensated recording keeps it";
+
+/// What was corrected without a known cause on these runs.
+fn described(effects: &[EffectReport], finding: &Finding<'_>, fitted: &[SensorRun]) -> Vec<Unexplained> {
     let periods = finding.hypothesis.angular_gain.abs();
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
@@ -386,7 +388,9 @@ fn described(effects: &[EffectReport], finding: &Finding<'_>) -> Vec<Unexplained
                 "corrected as a constant that changes sign with the direction; runs at two speeds tell a lag from play",
             ),
             "acceleration-lag" => {
-                add("rate-dependent", None, 0.0, "corrected as an error in proportion to the acceleration");
+                let all: Vec<f64> = fitted.iter().flat_map(|run| run.acceleration_rad_s2.iter().copied()).collect();
+                let rms = periods * value(e, "acceleration_lag").abs() * root_mean_square(&all);
+                add("rate-dependent", None, std::f64::consts::SQRT_2 * rms, BY_ACCELERATION);
             }
             // a bias or a lag that may as well be nothing has a name
             _ => {}

@@ -23,6 +23,7 @@ use crate::recording::Instrument;
 use crate::report::benefit::no_help;
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
+use crate::report::recorded::set_aside;
 use crate::report::stages::stages;
 use crate::report::{
     DecayReport, EffectReport, Estimate, Heldout, Report, ResidualReport, RunReport, SCHEMA, Status, StepReport, Tool,
@@ -280,11 +281,11 @@ fn remarks(finding: &Finding, fitted: &[DecayRun], held: &[DecayRun], head: &Hea
         );
     }
     let spikes: usize = finding.fit.set_aside.iter().flatten().filter(|a| **a).count();
-    if spikes > 0 {
-        out.push(format!("{spikes} stretches were set aside as spikes"));
-    }
+    out.extend(set_aside(spikes, "stretch"));
     for run in fitted.iter().chain(held).filter(|r| r.in_noise > 0) {
-        out.push(format!("{}: the last {} of {} rows were left out, near the noise", run.name, run.in_noise, run.rows));
+        let last = if run.in_noise == 1 { "last row of".to_owned() } else { format!("last {} of", run.in_noise) };
+        let left_out = if run.in_noise == 1 { "was" } else { "were" };
+        out.push(format!("{}: the {last} {} rows {left_out} left out, near the noise", run.name, run.rows));
     }
     out
 }

@@ -28,6 +28,15 @@ pub(crate) fn run_report(run: &Run) -> RunReport {
     }
 }
 
+/// Says how many samples, or what else is counted, were set aside as spikes; nothing where none was.
+pub(crate) fn set_aside(count: usize, one: &str) -> Option<String> {
+    match count {
+        0 => None,
+        1 => Some(format!("1 {one} was set aside as a spike")),
+        _ => Some(format!("{count} {one}{} were set aside as spikes", if one.ends_with("ch") { "es" } else { "s" })),
+    }
+}
+
 /// Mean of what is finite.
 fn mean_finite(values: &[f64]) -> Option<f64> {
     let (sum, count) = values.iter().filter(|v| v.is_finite()).fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
@@ -53,4 +62,17 @@ fn dropped(d: &Dropped) -> Vec<String> {
         format!("{} × {reason}{first}", tally.count)
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::set_aside;
+
+    #[test]
+    fn one_is_no_many() {
+        assert_eq!(set_aside(0, "sample"), None);
+        assert_eq!(set_aside(1, "stretch").as_deref(), Some("1 stretch was set aside as a spike"));
+        assert_eq!(set_aside(2, "stretch").as_deref(), Some("2 stretches were set aside as spikes"));
+        assert_eq!(set_aside(3, "sample").as_deref(), Some("3 samples were set aside as spikes"));
+    }
 }

@@ -144,6 +144,17 @@ fn without_a_stated_rate_precession_is_told_and_the_angular_gain_is_not() {
 }
 
 #[test]
+fn precession_of_decays_at_several_rates_is_null() {
+    let report = identified_both_ways(&Ring::usual(), 4);
+    let written = serde_json::to_value(&report).unwrap();
+    for name in ["precession_dph", "precession_dph_declared"] {
+        assert!(written["decay"][name].is_null(), "{name}: {}", written["decay"]);
+    }
+    let read: Report = serde_json::from_value(written).unwrap();
+    assert!(!read.decay.unwrap().precession_dph.is_told());
+}
+
+#[test]
 fn an_angular_gain_that_no_resonator_has_is_no_answer_of_a_decay_either() {
     let folder = tempfile::tempdir().unwrap();
     // 10 deg/s, written in rad/s
