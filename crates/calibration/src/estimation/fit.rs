@@ -168,7 +168,8 @@ pub(crate) fn fit(
         step_number += 1;
         // Levenberg and Marquardt: a step that made things worse is taken back and shortened.
         let worse = far_off || best.as_ref().is_some_and(|b| here.mean_square() > b.mean_square() * (1.0 + 1e-9));
-        let (from, last) = match (worse && !polishing, best.take()) {
+        let taken_back = worse && !polishing;
+        let (from, last) = match (taken_back, best.take()) {
             (true, Some(b)) => {
                 damping = (damping * 10.0f64).max(1e-3);
                 result.hypothesis = b.hypothesis.clone();
@@ -199,7 +200,8 @@ pub(crate) fn fit(
         if last {
             break;
         }
-        if (small && damping == 0.0) || step_number + 1 >= effort.steps {
+        // what is taken back and shortened to nothing has no better value near: spikes at their limit come and go
+        if (small && (damping == 0.0 || taken_back)) || step_number + 1 >= effort.steps {
             if !effort.polish || (small && every_sample) {
                 break;
             }

@@ -13,15 +13,15 @@ pub(crate) const LANES: usize = 4;
 
 /// A value with its slopes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Jet {
+pub(crate) struct Jet<const N: usize = LANES> {
     pub(crate) value: f64,
-    pub(crate) slope: [f64; LANES],
+    pub(crate) slope: [f64; N],
 }
 
-impl Jet {
+impl<const N: usize> Jet<N> {
     /// A value that does not depend on the unknowns.
     pub(crate) fn constant(value: f64) -> Self {
-        Self { value, slope: [0.0; LANES] }
+        Self { value, slope: [0.0; N] }
     }
 
     /// The unknown of `lane` itself.
@@ -31,36 +31,40 @@ impl Jet {
         jet
     }
 
-    // Lanes are written out: an iterator over them is not always inlined.
-
     /// f(self) given f and f′ at the value.
     #[inline]
     fn chain(self, value: f64, derivative: f64) -> Self {
-        let [a, b, c, d] = self.slope;
-        Self { value, slope: [a * derivative, b * derivative, c * derivative, d * derivative] }
+        let mut slope = self.slope;
+        for s in &mut slope {
+            *s *= derivative;
+        }
+        Self { value, slope }
     }
 
     /// u·self + v·other in the slopes.
     #[inline]
     fn combine(self, other: Self, value: f64, u: f64, v: f64) -> Self {
-        let ([a, b, c, d], [e, f, g, h]) = (self.slope, other.slope);
-        Self { value, slope: [u * a + v * e, u * b + v * f, u * c + v * g, u * d + v * h] }
+        let mut slope = self.slope;
+        for (s, o) in slope.iter_mut().zip(&other.slope) {
+            *s = u * *s + v * o;
+        }
+        Self { value, slope }
     }
 }
 
-impl PartialEq for Jet {
+impl<const N: usize> PartialEq for Jet<N> {
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value
     }
 }
 
-impl PartialOrd for Jet {
+impl<const N: usize> PartialOrd for Jet<N> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
 }
 
-impl Add for Jet {
+impl<const N: usize> Add for Jet<N> {
     type Output = Self;
     #[inline]
     fn add(self, o: Self) -> Self {
@@ -68,7 +72,7 @@ impl Add for Jet {
     }
 }
 
-impl Sub for Jet {
+impl<const N: usize> Sub for Jet<N> {
     type Output = Self;
     #[inline]
     fn sub(self, o: Self) -> Self {
@@ -76,7 +80,7 @@ impl Sub for Jet {
     }
 }
 
-impl Mul for Jet {
+impl<const N: usize> Mul for Jet<N> {
     type Output = Self;
     #[inline]
     fn mul(self, o: Self) -> Self {
@@ -84,7 +88,7 @@ impl Mul for Jet {
     }
 }
 
-impl Div for Jet {
+impl<const N: usize> Div for Jet<N> {
     type Output = Self;
     #[inline]
     fn div(self, o: Self) -> Self {
@@ -93,7 +97,7 @@ impl Div for Jet {
     }
 }
 
-impl Neg for Jet {
+impl<const N: usize> Neg for Jet<N> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -101,7 +105,7 @@ impl Neg for Jet {
     }
 }
 
-impl Real for Jet {
+impl<const N: usize> Real for Jet<N> {
     #[inline]
     fn ratio(numerator: i32, denominator: i32) -> Self {
         Self::constant(f64::ratio(numerator, denominator))

@@ -4,7 +4,7 @@ use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Stage, Values};
 use cvg_model::{ActuationGains, ControlOutputs, Envelope, Real};
 
-use crate::model::hypothesis::{Hypothesis, Unknown};
+use crate::model::hypothesis::{Hypothesis, Member, Unknown};
 use crate::model::jet::Jet;
 use crate::model::unknowns::{Lanes, Unknowns};
 use crate::recording::Instrument;
@@ -34,6 +34,8 @@ pub(crate) struct Vibration {
     pub(crate) steering: [f64; 2],
     /// slopes of the four and of the steering by ln a against the unknowns, in their order
     pub(crate) slopes: Vec<[f64; 5]>,
+    /// what each link of the readout gave, with slopes
+    undone: Vec<Envelope<Jet<LINK>>>,
 }
 
 /// Index of the quantities of [`Vibration`] in its slopes.
@@ -48,16 +50,28 @@ pub(crate) mod quantity {
 /// Effects that act in one stage, one after the other, with their values.
 type Chain<T> = Vec<(EffectId, Values<T>)>;
 
+/// Components of an envelope.
+const COMPONENTS: usize = 4;
+/// What the envelope behind a link of the readout is differentiated against: the one before it, then the parameters.
+const LINK: usize = COMPONENTS + MAX_PARAMETERS;
+
+/// An effect of the readout that is undone, and where the slopes of its parameters belong.
+struct Link {
+    id: EffectId,
+    values: Values<Jet<LINK>>,
+    columns: [Option<usize>; MAX_PARAMETERS],
+}
+
 /// A hypothesis made ready to be asked about many samples: its members sorted by stage, their values with the slopes
 /// that are asked for.
 pub(crate) struct Predictor<'h> {
     pub(crate) hypothesis: &'h Hypothesis,
     unknowns: &'h Unknowns,
-    /// for each group of lanes, last effect first
-    readout: Vec<Chain<Jet>>,
+    /// last effect first; empty where none of its parameters is an unknown
+    readout: Vec<Link>,
     /// as they are, and without slopes of their own for vibrations that have them
     mechanics: Chain<f64>,
-    mechanics_of_jets: Chain<Jet>,
+    mechanics_of_jets: Chain<Jet<COMPONENTS>>,
     /// columns of mechanics unknowns, and the effect with a one in that place: mechanics are linear
     units: Vec<(usize, EffectId, Values<f64>)>,
     actuation: Drive<f64>,
@@ -97,15 +111,17 @@ impl<'h> Predictor<'h> {
             control_latency_s: lanes.jet(hypothesis.control_latency_s, lanes.control_latency),
             effects: jets(Stage::Actuation, lanes),
         };
+        let link = |(member, m): (usize, &Member)| Link {
+            id: m.id,
+            values: std::array::from_fn(|p| Jet::unknown(m.values[p], COMPONENTS + p)),
+            columns: unknowns.columns_of(member),
+        };
+        let readout = hypothesis.acting(Stage::Readout).rev().filter(|_| unknowns.of_the_readout);
         let forcing = unknowns.forcing.iter();
         Self {
             hypothesis,
             unknowns,
-            readout: unknowns
-                .readout
-                .iter()
-                .map(|lanes| jets(Stage::Readout, lanes).into_iter().rev().collect())
-                .collect(),
+            readout: readout.map(link).collect(),
             mechanics_of_jets: mechanics.iter().map(|(id, values)| (*id, values.map(Jet::constant))).collect(),
             mechanics,
             units: unknowns.mechanics.iter().filter_map(of_column).collect(),
@@ -132,7 +148,7 @@ impl<'h> Predictor<'h> {
         at: &Moment<f64>,
         out: &mut Vibration,
     ) {
-        use quantity::{GROWTH, LN_AMPLITUDE, THETA, THETA_RATE};
+        use quantity::{GROWTH, THETA_RATE};
         let (hypothesis, unknowns) = (self.hypothesis, self.unknowns);
         let recorded = commands.is_some();
         out.slopes.clear();
@@ -143,29 +159,8 @@ impl<'h> Predictor<'h> {
         let driven = commands.map(|v| (v, major_axis(&seen, &seen.pendulum())));
         let forced = driven.as_ref().map(|(v, axis)| self.actuation.rate(v, axis, |x| x));
         let mechanical = hypothesis.instrument == Instrument::Gyroscope;
-        let mut z = Envelope::zero();
-        if self.readout.is_empty() {
-            z = hypothesis.unread(seen, at);
-        }
-        // how bearing and ln of the amplitude change with the vibration
-        let mut by_envelope = None;
-        for (chain, lanes) in self.readout.iter().zip(&unknowns.readout) {
-            let moment = at.map(Jet::constant);
-            let jets = chain.iter().fold(lifted(&seen), |e, (id, values)| id.unread(values, e, &moment));
-            z = part(&jets, |j| j.value);
-            // the same for every group of lanes
-            let (bearing, growth) = *by_envelope.get_or_insert_with(|| {
-                let [x_c, x_s, y_c, y_s] = hypothesis.bearing(&by_component(&z)).slope;
-                (Envelope::new(x_c, x_s, y_c, y_s), z * (1.0 / z.pendulum().e))
-            });
-            let theta_rate = mechanical.then(|| jets.precession(&self.rate_of(&jets, forced.as_ref())));
-            for (lane, &i) in lanes.columns.iter().enumerate() {
-                let moved = part(&jets, |j| j.slope[lane]);
-                out.slopes[i][THETA] = dot(&bearing, &moved);
-                out.slopes[i][LN_AMPLITUDE] = dot(&growth, &moved);
-                out.slopes[i][THETA_RATE] = theta_rate.map_or(0.0, |r| r.slope[lane]);
-            }
-        }
+        let z = self.undo_readout(seen, at, out);
+        self.add_readout(&z, forced.as_ref(), out);
         out.theta = hypothesis.bearing(&z);
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
@@ -192,6 +187,58 @@ impl<'h> Predictor<'h> {
                     out.slopes[i][GROWTH] += grow;
                 }
             }
+        }
+    }
+
+    /// The vibration behind the readout, with what each link gave on the way.
+    fn undo_readout(&self, seen: Envelope<f64>, at: &Moment<f64>, out: &mut Vibration) -> Envelope<f64> {
+        out.undone.clear();
+        if self.readout.is_empty() {
+            return self.hypothesis.unread(seen, at);
+        }
+        let moment = at.map(Jet::constant);
+        self.readout.iter().fold(seen, |e, link| {
+            let undone = link.id.unread(&link.values, by_component(&e), &moment);
+            out.undone.push(undone);
+            part(&undone, |j| j.value)
+        })
+    }
+
+    /// Slopes against the readout's parameters by the chain rule: how bearing, ln of the amplitude and the rate of the pattern
+    /// change with the vibration `z`, then with what stood before each link, from the last one undone to the first.
+    fn add_readout(&self, z: &Envelope<f64>, forced: Option<&Envelope<f64>>, out: &mut Vibration) {
+        use quantity::{LN_AMPLITUDE, THETA, THETA_RATE};
+        if self.readout.is_empty() {
+            return;
+        }
+        let jets: Envelope<Jet<COMPONENTS>> = by_component(z);
+        let mut gradients = [[0.0; COMPONENTS]; 3];
+        gradients[THETA] = self.hypothesis.bearing(&jets).slope;
+        let Envelope { x_c, x_s, y_c, y_s } = *z * (1.0 / z.pendulum().e);
+        gradients[LN_AMPLITUDE] = [x_c, x_s, y_c, y_s];
+        if self.hypothesis.instrument == Instrument::Gyroscope {
+            gradients[THETA_RATE] = jets.precession(&self.rate_of(&jets, forced)).slope;
+        }
+        for (link, undone) in self.readout.iter().zip(&out.undone).rev() {
+            // d(quantity) against every lane of this link
+            let along = gradients.map(|[x_c, x_s, y_c, y_s]| {
+                let mut sums = [0.0; LINK];
+                for (component, gradient) in
+                    [(&undone.x_c, x_c), (&undone.x_s, x_s), (&undone.y_c, y_c), (&undone.y_s, y_s)]
+                {
+                    for (sum, slope) in sums.iter_mut().zip(&component.slope) {
+                        *sum += gradient * slope;
+                    }
+                }
+                sums
+            });
+            for (lane, column) in (COMPONENTS..).zip(&link.columns) {
+                let Some(column) = *column else { continue };
+                for (slope, along) in out.slopes[column].iter_mut().zip(&along) {
+                    *slope = along[lane];
+                }
+            }
+            gradients = along.map(|[x_c, x_s, y_c, y_s, ..]| [x_c, x_s, y_c, y_s]);
         }
     }
 
@@ -257,7 +304,7 @@ impl<'h> Predictor<'h> {
     }
 
     /// How the mechanics and forces that do not depend on the readout move a vibration, per second.
-    fn rate_of(&self, z: &Envelope<Jet>, forced: Option<&Envelope<f64>>) -> Envelope<Jet> {
+    fn rate_of(&self, z: &Envelope<Jet<COMPONENTS>>, forced: Option<&Envelope<f64>>) -> Envelope<Jet<COMPONENTS>> {
         let start = forced.map_or_else(Envelope::zero, lifted);
         self.mechanics_of_jets.iter().fold(start, |sum, (id, values)| sum + id.mechanics(values, z))
     }
@@ -290,20 +337,20 @@ impl<T: Real> Drive<T> {
 
 /// One number of each component.
 #[inline]
-fn part(e: &Envelope<Jet>, of: impl Fn(Jet) -> f64) -> Envelope<f64> {
+fn part<const N: usize>(e: &Envelope<Jet<N>>, of: impl Fn(Jet<N>) -> f64) -> Envelope<f64> {
     Envelope::new(of(e.x_c), of(e.x_s), of(e.y_c), of(e.y_s))
 }
 
-/// An envelope of which each component is an unknown of its own.
+/// An envelope of which each component is an unknown of its own, in the first lanes.
 #[inline]
-fn by_component(e: &Envelope<f64>) -> Envelope<Jet> {
+fn by_component<const N: usize>(e: &Envelope<f64>) -> Envelope<Jet<N>> {
     let [x_c, x_s, y_c, y_s] = [e.x_c, e.x_s, e.y_c, e.y_s];
     Envelope::new(Jet::unknown(x_c, 0), Jet::unknown(x_s, 1), Jet::unknown(y_c, 2), Jet::unknown(y_s, 3))
 }
 
 /// An envelope that does not depend on the unknowns.
 #[inline]
-fn lifted(e: &Envelope<f64>) -> Envelope<Jet> {
+fn lifted<const N: usize>(e: &Envelope<f64>) -> Envelope<Jet<N>> {
     Envelope::new(Jet::constant(e.x_c), Jet::constant(e.x_s), Jet::constant(e.y_c), Jet::constant(e.y_s))
 }
 
@@ -354,6 +401,7 @@ impl Vibration {
             growth: 0.0,
             steering: [0.0; 2],
             slopes: Vec::new(),
+            undone: Vec::new(),
         }
     }
 }

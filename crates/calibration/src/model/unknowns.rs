@@ -47,8 +47,8 @@ impl Lanes {
 pub(crate) struct Unknowns {
     /// all, in the order of columns
     pub(crate) all: Vec<Unknown>,
-    /// readout parameters, in groups of lanes
-    pub(crate) readout: Vec<Lanes>,
+    /// some are readout parameters
+    pub(crate) of_the_readout: bool,
     /// columns of mechanics parameters
     pub(crate) mechanics: Vec<usize>,
     /// force scale, control latency and actuation parameters, in groups of lanes: one without columns where there are none
@@ -79,7 +79,7 @@ impl Unknowns {
             if columns.is_empty() { vec![Lanes::new(columns, &all, members)] } else { groups(columns) }
         };
         Self {
-            readout: groups(&at(Stage::Readout)),
+            of_the_readout: !at(Stage::Readout).is_empty(),
             mechanics: at(Stage::Mechanics),
             forcing: one_at_least(&at(Stage::Actuation)),
             input: one_at_least(&at(Stage::Input)),
@@ -87,5 +87,10 @@ impl Unknowns {
             damping: all.iter().position(|u| *u == Unknown::Damping),
             all,
         }
+    }
+
+    /// The column of each parameter of a member.
+    pub(crate) fn columns_of(&self, member: usize) -> [Option<usize>; MAX_PARAMETERS] {
+        std::array::from_fn(|p| self.all.iter().position(|u| *u == Unknown::Effect(member, p)))
     }
 }
