@@ -4,7 +4,9 @@
 use cvg_calibration::Identification;
 use cvg_calibration::recording::{Recording, Role, Run};
 use cvg_calibration::report::Status;
-use cvg_tests::angle_sensor::{Noise, angle_at, channels, find, held_out, identified, lines, read_at, run, sensor};
+use cvg_tests::angle_sensor::{
+    Noise, a_row_a_second, angle_at, channels, find, held_out, identified, lines, read_at, run, sensor,
+};
 
 fn role(held: bool) -> Role {
     if held { Role::Holdout } else { Role::Fit }
@@ -482,4 +484,69 @@ fn stations_in_any_order_are_followed_by_whole_periods() {
         assert!(held_out(&i) < 0.04, "{turns} turns: {}° of 0.017° noise", held_out(&i));
         assert!(find(&i, "angle-table").is_none() && i.report.warnings.is_empty(), "{:#?}", i.report.warnings);
     }
+}
+
+/// A ten-bit encoder at the full steps of a motor, there and back twice, and at the half steps between them: what its last bit makes
+/// of a step is the same each time that it is met, and another between the steps.
+#[test]
+fn steps_of_the_last_bit_that_repeat_are_no_table() {
+    let lsb = 360.0 / 1024.0;
+    for seed in 0..4 {
+        let mut noise = Noise::new(seed);
+        let mut read = |degrees: f64| {
+            let a = degrees.to_radians();
+            let off = 0.9 * (a + 0.4).cos() + 0.3 * (2.0 * a - 1.0).sin();
+            ((degrees + off + 0.01 * noise.sample()) / lsb).round() * lsb
+        };
+        let steps = |first: f64| {
+            (0..800).map(move |i| first + 1.8 * f64::from(if i / 200 % 2 == 0 { i % 200 } else { 199 - i % 200 }))
+        };
+        let fitted = a_row_a_second(steps(0.0).collect(), &mut read, Role::Fit);
+        let between = a_row_a_second(steps(0.9).take(200).collect(), &mut read, Role::Holdout);
+        let i = identified(sensor(vec![fitted, between]));
+        // the last bit alone is worth 0.101°
+        assert!(held_out(&i) < 0.112, "seed {seed}: {}°", held_out(&i));
+    }
+}
+
+/// An encoder turned by hand beside a reference that is read to 0.1°: its noise is in the error and in what would be an acceleration.
+#[test]
+fn noise_of_the_reference_is_no_error_that_follows_the_acceleration() {
+    for seed in 0..6 {
+        let mut noise = Noise::new(seed);
+        let mut turned = |role, phase: f64| {
+            let angle = |i: usize| 200.0 * (0.004 * i as f64 + phase).sin() + 60.0 * (0.011 * i as f64).sin();
+            let (mut theta, mut reference) = (Vec::new(), Vec::new());
+            for a in (0..1200).map(angle) {
+                theta.push(a + 0.8 * a.to_radians().cos() + 0.01 * noise.sample());
+                reference.push(a + 0.1 * noise.sample());
+            }
+            let recording = Recording {
+                t_s: (0..theta.len()).map(|i| 0.02 * i as f64).collect(),
+                theta_deg: Some(theta),
+                table_deg: Some(reference),
+                ..Recording::default()
+            };
+            run("turned.csv", role, recording)
+        };
+        let i = identified(sensor(vec![turned(Role::Fit, 0.0), turned(Role::Holdout, 1.0)]));
+        assert!(find(&i, "acceleration-lag").is_none(), "seed {seed}: {:#?}", i.report.effects);
+        assert!(held_out(&i) < 0.11, "seed {seed}: {}° of 0.1° noise", held_out(&i));
+    }
+}
+
+/// Channels that saturate run straighter than a circle between their corners, and were recorded all the same.
+#[test]
+fn rows_of_channels_that_saturate_are_not_taken_for_drawn_ones() {
+    let mut noise = Noise::new(3);
+    let mut of = |role, first: f64| {
+        let angles: Vec<f64> = (0..720).map(|i| first + 2.0 * f64::from(i)).collect();
+        let mut read = |v: f64| (2.5 * v).tanh() + 2e-4 * noise.sample();
+        let channels = angles.iter().map(|a| (read(a.to_radians().cos()), read(a.to_radians().sin())));
+        let (x, y) = channels.unzip();
+        read_at(angles, x, y, role)
+    };
+    let i = identified(sensor(vec![of(Role::Fit, 0.0), of(Role::Holdout, 0.7)]));
+    let drawn: Vec<_> = i.report.warnings.iter().filter(|w| w.contains("interpolated")).collect();
+    assert!(drawn.is_empty(), "{drawn:?}");
 }

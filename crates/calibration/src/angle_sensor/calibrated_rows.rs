@@ -17,7 +17,7 @@ pub(super) fn covered_deg(hypothesis: &Hypothesis, fitted: &[SensorRun]) -> Opti
         Reading::Angle(theta) => theta.clone(),
         Reading::Channels(channels) => channels.iter().map(|[x, y]| read(*x, *y)).collect(),
     });
-    let covered = Gap::of(angles, std::f64::consts::TAU / hypothesis.period_rad)?.covered();
+    let covered = Gap::all(angles, std::f64::consts::TAU / hypothesis.period_rad).first()?.covered();
     Some(covered.map(|share| (share * hypothesis.period_rad).to_degrees()))
 }
 

@@ -2,10 +2,11 @@
 //! that neighbours of a row do not betray it (Burman, Chow and Nolan 1994; Roberts et al. 2017), and the simplest model
 //! within a standard error of the best, or half of one, is taken, the errors paired over blocks (Breiman et al. 1984).
 
-use super::gap::Gap;
+use super::gap::{Gap, place};
 use super::readout::Readout;
 use super::samples::SensorRun;
 use super::table_fit::{Sample, Shape, TableFit};
+use crate::numerics::statistics::median;
 
 /// Folds of blocks; blocks of all rows of a run where they are interleaved, and of a run that repeats its period.
 const FOLDS: usize = 5;
@@ -20,6 +21,21 @@ const WIDEST_GAP: f64 = 0.4;
 /// The share of what is asked for that lies in such a part, and how far from its edges, as a share of the period. Engineering choices.
 const ASKED: f64 = 0.1;
 const EDGE: f64 = 0.02;
+/// What is asked for stands between stations where it is further from them than this share of the period, and nearer than that: rows of a
+/// sensor that turns are nearer to one another, and beyond is a part without rows. It is much further from what is fitted than what is
+/// left out is from this factor on. Engineering choices.
+const LEAST_DISTANCE: f64 = 1.0 / 2048.0;
+const LARGEST_DISTANCE: f64 = 1.0 / 40.0;
+const MUCH_FURTHER: f64 = 2.0;
+/// Numbers of sectors that are tried, and by which factor what is left out may be further from the rest than what is asked for: a few dozen
+/// stations of which every other is asked for cannot be left out so near, and without one of them a table is another. Of many stations,
+/// nearer to one another than twice this share of the period, sectors are four times as wide as what is asked for is far: two of them at
+/// least, for what the last bit makes of one may go on at the next. Engineering choices.
+const SECTORS: [usize; 6] = [20, 32, 50, 80, 128, 200];
+const ABOUT_AS_FAR: f64 = 1.5;
+const OF_MANY_STATIONS: f64 = 1.0 / 256.0;
+const FEWEST_SECTORS: f64 = 20.0;
+const MOST_SECTORS: f64 = 512.0;
 /// Whole runs are left out from this many on.
 const FEWEST_RUNS: usize = 3;
 /// Standard errors that one more line has to gain.
@@ -74,29 +90,93 @@ pub(crate) struct Folds {
 impl Folds {
     /// Whole runs where three or more cover the period; fifths in time where one run repeats it; else interleaved blocks, and, where a
     /// part of the period has no row and the model is asked for the angle there, at a reference of `asked`, fifths of the way: each counts
-    /// as much as is asked for where rows are, and where they are not.
+    /// as much as is asked for where rows are, and where they are not. Where stations leave it much nearer to what is fitted than what is
+    /// asked for is, whole stations are left out in the place of all these.
     pub(crate) fn of(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> Self {
-        let periods: Vec<f64> = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU).collect();
-        let least = periods.iter().copied().fold(f64::INFINITY, f64::min);
+        let far = share_asked_in_the_gap(runs, asked, cycles_per_rad);
+        let in_time = Self::in_time(runs, cycles_per_rad);
+        let usual = in_time.unwrap_or_else(|| {
+            let of_the_way = || Self::of_the_way(runs).about_means();
+            match far {
+                0.0 => Self::interleaved(runs),
+                1.0 => of_the_way(),
+                far => Self::interleaved(runs).weighing(1.0 - far).and(of_the_way().weighing(far)),
+            }
+        });
+        let sectors = if far > 0.0 { None } else { usual.sectors_as_far(runs, asked, cycles_per_rad) };
+        sectors.unwrap_or(usual)
+    }
+
+    /// Whole runs, or fifths in time of one.
+    fn in_time(runs: &[SensorRun], cycles_per_rad: f64) -> Option<Self> {
+        let periods = runs.iter().map(|r| r.travel_rad() * cycles_per_rad / std::f64::consts::TAU);
+        let least = periods.fold(f64::INFINITY, f64::min);
         if runs.len() >= FEWEST_RUNS && least > PERIODS_OF_RUNS {
-            return Self::leaving(runs, true, |number, _, _| (number, 0), |_| 1);
+            return Some(Self::leaving(runs, true, |number, _, _| (number, 0), |_| 1));
         }
-        if runs.len() == 1 && least > PERIODS_OF_ONE {
-            let part = |i: usize, parts: usize, rows: usize| i * parts / rows;
-            return Self::leaving(
+        let part = |i: usize, parts: usize, rows: usize| i * parts / rows;
+        (runs.len() == 1 && least > PERIODS_OF_ONE).then(|| {
+            Self::leaving(
                 runs,
                 true,
                 |_, i, rows| (part(i, FOLDS, rows), part(i, CONTIGUOUS_BLOCKS, rows)),
                 |_| CONTIGUOUS_BLOCKS,
-            );
+            )
+        })
+    }
+
+    /// Sectors of the period, of each of which all rows are left out, whatever pass they are of: so many that what is left out is about as
+    /// far from what is fitted as what is asked for. `None` where these folds see to that, where no sectors do, and of a sensor that turns,
+    /// whose rows stand everywhere.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    fn sectors_as_far(&self, runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> Option<Self> {
+        let places: Vec<f64> = runs.iter().flat_map(|r| &r.reference_rad).map(|a| place(*a, cycles_per_rad)).collect();
+        let asked: Vec<f64> = asked.iter().map(|a| place(*a, cycles_per_rad)).collect();
+        let far = median(&mut distances(&asked, &places));
+        if !(LEAST_DISTANCE..LARGEST_DISTANCE).contains(&far) || far <= MUCH_FURTHER * self.left_out_from_kept(&places)
+        {
+            return None;
         }
-        let far = share_asked_in_the_gap(runs, asked, cycles_per_rad);
-        let of_the_way = || Self::of_the_way(runs).about_means();
-        match far {
-            0.0 => Self::interleaved(runs),
-            1.0 => of_the_way(),
-            far => Self::interleaved(runs).weighing(1.0 - far).and(of_the_way().weighing(far)),
+        if far < OF_MANY_STATIONS {
+            return Some(Self::of_sectors(
+                runs,
+                (0.25 / far).clamp(FEWEST_SECTORS, MOST_SECTORS) as usize,
+                cycles_per_rad,
+            ));
         }
+        let of = |count: usize| {
+            let folds = Self::of_sectors(runs, count, cycles_per_rad);
+            (folds.left_out_from_kept(&places) / far, folds)
+        };
+        let off = |(ratio, _): &(f64, Self)| ratio.ln().abs();
+        let nearest = SECTORS.into_iter().map(of).min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.filter(|(ratio, _)| *ratio < ABOUT_AS_FAR).map(|(_, folds)| folds)
+    }
+
+    /// How far what is left out is from what is kept, of rows at these places, in the median.
+    fn left_out_from_kept(&self, places: &[f64]) -> f64 {
+        let of_fold = |fold: usize| {
+            let (out, kept): (Vec<_>, Vec<_>) = (0..places.len()).partition(|row| self.leaves_out(fold, *row));
+            let [out, kept] = [out, kept].map(|rows| rows.iter().map(|row| places[*row]).collect::<Vec<f64>>());
+            distances(&out, &kept)
+        };
+        median(&mut (0..self.count()).flat_map(of_fold).collect::<Vec<f64>>())
+    }
+
+    /// Every fifth of so many sectors of the period.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of sectors")]
+    fn of_sectors(runs: &[SensorRun], count: usize, cycles_per_rad: f64) -> Self {
+        // stations stand in the middle of a sector as a rule, and not on the edge of two
+        let sector = |angle: f64| (place(angle, cycles_per_rad) * count as f64 + 0.5) as usize % count;
+        Self::leaving(
+            runs,
+            false,
+            |number, i, _| {
+                let sector = sector(runs[number].reference_rad[i]);
+                (sector % FOLDS, sector)
+            },
+            |_| count,
+        )
     }
 
     /// Interleaved blocks of every run.
@@ -217,11 +297,30 @@ impl Folds {
 /// out; 0 where there is no such part or next to nothing is asked for there.
 fn share_asked_in_the_gap(runs: &[SensorRun], asked: &[f64], cycles_per_rad: f64) -> f64 {
     let angles = runs.iter().flat_map(|r| r.reference_rad.iter().copied());
-    let Some(gap) = Gap::of(angles, cycles_per_rad).filter(|gap| gap.width < WIDEST_GAP) else { return 0.0 };
+    let gaps = Gap::all(angles, cycles_per_rad);
+    // where there are two, rows stand on either side of each
+    let [gap] = gaps.as_slice() else { return 0.0 };
+    if gap.width >= WIDEST_GAP {
+        return 0.0;
+    }
     // rows that are held out among those that are fitted stand at its very edge at most
     let within = asked.iter().filter(|a| gap.holds(**a, cycles_per_rad, EDGE)).count();
     let share = within as f64 / asked.len().max(1) as f64;
     if share >= ASKED { share } else { 0.0 }
+}
+
+/// How far each of these places in the period is from the nearest of others.
+fn distances(these: &[f64], others: &[f64]) -> Vec<f64> {
+    let mut others = others.to_vec();
+    others.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (others.first().copied(), others.last().copied()) else { return Vec::new() };
+    let nearest = |at: &f64| {
+        let next = others.partition_point(|other| other < at);
+        let after = others.get(next).copied().unwrap_or(1.0 + first) - at;
+        let before = at - if next > 0 { others[next - 1] } else { last - 1.0 };
+        after.min(before)
+    };
+    these.iter().map(nearest).collect()
 }
 
 /// Squared errors of left-out rows, by block.

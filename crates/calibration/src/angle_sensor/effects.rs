@@ -126,6 +126,12 @@ impl Described<'_> {
         out
     }
 
+    /// What is undone, where there are no [effects](Self::effects) that it could be said of.
+    pub(super) fn said_without_effects(&self) -> Option<String> {
+        let readout = self.model.front().filter(|_| self.effects().is_empty())?;
+        undone_without_a_name(readout, &self.deviations.readout).filter(|_| self.model.outcome != Outcome::Neutral)
+    }
+
     fn evidence(&self) -> String {
         let of = if self.model.by_radius { "of the radius" } else { "of the angle" };
         let degrees =
@@ -254,6 +260,35 @@ impl Described<'_> {
     }
 }
 
+/// The effects of a readout beside its gain ratio, and where their values stand.
+fn others(kind: Kind) -> impl Iterator<Item = (EffectId, &'static [usize])> {
+    let cubics: &[usize] = if kind == Kind::Cubic { &[4] } else { &[4, 5] };
+    let all: [(Kind, EffectId, &[usize]); 3] = [
+        (Kind::Offset, EffectId::DetectionOffset, &[0, 1]),
+        (Kind::Affine, EffectId::DetectionSkew, &[3]),
+        (Kind::Cubic, EffectId::DetectionCubic, cubics),
+    ];
+    all.into_iter().filter(move |(from, ..)| kind >= *from).map(|(_, id, at)| (id, at))
+}
+
+/// Values of a readout that are undone and no further from nothing than their intervals, with the names of the library.
+fn unnamed(readout: &Readout, d: &[f64]) -> Option<String> {
+    let v = values(readout);
+    let is_unnamed = |at: &[usize]| at.iter().all(|&i| v[i].abs() <= STUDENT_19 * d[i]);
+    let named = |(id, at): (EffectId, &[usize])| {
+        let each = at.iter().zip(id.description().parameters).map(|(&i, p)| format!(" {} {:.2e}", p.name, v[i]));
+        each.collect::<String>()
+    };
+    let all: String = others(readout.kind).filter(|(_, at)| is_unnamed(at)).map(named).collect();
+    (!all.is_empty()).then_some(all)
+}
+
+/// What is undone where no effect of a readout is told from nothing.
+pub(crate) fn undone_without_a_name(readout: &Readout, d: &[f64]) -> Option<String> {
+    let values = unnamed(readout, d).filter(|_| readout.kind > Kind::Plain)?;
+    Some(format!("what is undone is no further from nothing than its intervals, and no effect is named:{values}"))
+}
+
 /// A readout in the words of the library, with the deviations of its values.
 pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> Vec<EffectReport> {
     let v = values(readout);
@@ -264,24 +299,11 @@ pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> V
         let parameters = at.iter().zip(library).map(|(&i, p)| parameter(p.name, p.unit, v[i], d[i])).collect();
         out.push(effect(library_id(id), origin, parameters, format!("{}; {evidence}", id.description().signature)));
     };
-    let kind = readout.kind;
-    if kind >= Kind::Affine {
+    if readout.kind >= Kind::Affine {
         add(EffectId::DetectionGainMismatch, Origin::Declared, &[2]);
     }
-    let cubics: &[usize] = if kind == Kind::Cubic { &[4] } else { &[4, 5] };
-    let others: [(Kind, EffectId, &[usize]); 3] = [
-        (Kind::Offset, EffectId::DetectionOffset, &[0, 1]),
-        (Kind::Affine, EffectId::DetectionSkew, &[3]),
-        (Kind::Cubic, EffectId::DetectionCubic, cubics),
-    ];
-    let mut not_told = String::new();
-    for (_, id, at) in others.into_iter().filter(|(from, ..)| kind >= *from) {
-        if at.iter().any(|i| significant(*i, 0.0)) {
-            add(id, Origin::Discovered, at);
-        } else {
-            let named = at.iter().zip(id.description().parameters).map(|(&i, p)| format!(" {} {:.2e}", p.name, v[i]));
-            not_told.extend(named);
-        }
+    for (id, at) in others(readout.kind).filter(|(_, at)| at.iter().any(|i| significant(*i, 0.0))) {
+        add(id, Origin::Discovered, at);
     }
     for (at, (id, _)) in readout.texts.iter().enumerate() {
         let first = LIBRARY_VALUES + at * MAX_PARAMETERS;
@@ -296,9 +318,9 @@ pub(crate) fn readout_effects(readout: &Readout, d: &[f64], evidence: &str) -> V
                         at its rail; the other channel and the radius stand in for it";
         out.push(effect(DETECTION_CLIP.id, Origin::Discovered, rails.collect(), evidence.into()));
     }
-    if let Some(first) = out.first_mut().filter(|_| !not_told.is_empty()) {
+    if let Some((first, values)) = out.first_mut().zip(unnamed(readout, d)) {
         first.evidence.push_str("; undone with it, no further from nothing than their intervals:");
-        first.evidence.push_str(&not_told);
+        first.evidence.push_str(&values);
     }
     out
 }

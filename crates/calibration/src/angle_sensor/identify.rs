@@ -408,6 +408,7 @@ fn sensor_finding(
     let without_ratio = gain_ratio.is_none() && !neutral && on_a_circle.is_none();
     warnings.extend(without_ratio.then(|| NO_GAIN_RATIO.to_owned()));
     warnings.extend(on_a_circle);
+    warnings.extend(described.said_without_effects());
     let thermal = thermal.filter(|_| !neutral);
     warnings.extend(thermal.and_then(Thermal::said));
     let recorded: Vec<SensorRun> = thinned.iter().map(SensorRun::as_recorded).collect();

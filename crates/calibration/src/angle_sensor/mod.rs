@@ -3,6 +3,7 @@
 mod agreement;
 mod autoregression;
 mod calibrated_rows;
+mod carried;
 mod circle;
 mod cross_axis;
 mod cross_validation;

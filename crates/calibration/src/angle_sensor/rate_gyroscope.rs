@@ -187,9 +187,12 @@ impl RateGyroscope {
         let gained: Vec<f64> = loss.iter().zip(&raw).map(|(a, b)| a - b).collect();
         let n = gained.len() as f64;
         let scatter = gained.iter().map(|g| (g - mean(&gained)).powi(2)).sum::<f64>() / (n - 1.0);
-        let answered = mean(&gained) < HARMS * (scatter / n).sqrt();
         let mut values = estimate(&all, &terms, law);
         let spread = deviations(&all, &terms, &values, &fits);
+        // what predicts worse than nothing does, if not clearly, has at least to be told from nothing
+        let is_told = |(value, deviation): (&f64, &f64)| value.abs() > T_PARTS * deviation;
+        let answered = mean(&gained) < HARMS * (scatter / n).sqrt()
+            && (mean(&gained) < 0.0 || values.iter().zip(&spread).any(is_told));
         let bias_varies = forget_a_bias_that_varies(&all, &terms, law, &mut values);
         let every = [Term::Bias, Term::Scale, Term::Lag];
         let (every_fit, _) = estimates(&all, &splits, &every, law);

@@ -8,7 +8,7 @@ use super::agreement::of_one_sensor;
 use super::cross_validation::{Candidate, Folds, Tolerance, choose, losses_of_radius};
 use super::curve::{Curve, mean_radius, undone};
 use super::deviations::{jackknife, other_noise, without_block};
-use super::effects::{LibraryReadout, clip, readout_effects, readout_members};
+use super::effects::{LibraryReadout, clip, readout_effects, readout_members, undone_without_a_name};
 use super::ellipse;
 use super::rails::Rails;
 use super::readout::{Kind, Readout};
@@ -122,6 +122,9 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         hypothesis.clip = clip(&readout);
     }
     let mut effects = if neutral { Vec::new() } else { readout_effects(&readout, &deviations, &evidence) };
+    if !neutral && effects.is_empty() {
+        warnings.extend(undone_without_a_name(&readout, &deviations));
+    }
     provenance::in_unit(&mut effects, provenance.readout_unit.as_deref());
     let calibration = Calibration { device, hypothesis, provenance };
     warnings.extend(fitted.iter().filter_map(|run| amplitude_that_changes(&readout, run)));

@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use cvg_model::effects::EffectId;
 use rayon::prelude::*;
 
+use super::carried::{OBSERVATIONS_PER_UNKNOWN, carries, stations, stations_carry};
 use super::circle;
 use super::cross_validation::{
     Candidate, Folds, Losses, Tolerance, best_by_angle, choose, cross_validate, finer, losses_of_radius,
 };
+use super::gap::Gap;
 use super::lines::{cover_a_turn, is_harmonic_of_table, strongest_and_its_aliases};
 use super::rails::Rails;
 use super::readout::{Competing, Kind, Readout, unknowns_of_texts};
@@ -27,21 +29,12 @@ const COARSE_ORDERS: [usize; 2] = [0, 4];
 const MOTION_ORDERS: [usize; 2] = [4, 12];
 /// Lengths offered anew beside an isolated line go up to this.
 const ORDER_BESIDE_LINES: usize = 12;
-/// Observations for each unknown, an engineering choice. A row observes the angle, and of two channels the radius too: 27
-/// stations allow a table of four harmonics, and eight a readout's offset, gain and skew.
-const OBSERVATIONS_PER_UNKNOWN: usize = 3;
 /// … or so many, where what is predicted is off by less than this share of what the largest model within the former leaves: a deviation
 /// card of ten headings tells two harmonics where they are most of what there is.
 const FEWEST_PER_UNKNOWN: usize = 2;
 const FAR_BETTER: f64 = 1.0 / 3.0;
 /// … and across gaps by less than this share of the sensor as it is: half of what noise with a memory is, no table of it predicts.
 const BETTER_ACROSS_GAPS: f64 = 0.5;
-/// Stations for each coefficient of a table and its constant, an engineering choice: a few more than would be met exactly. 12 stations
-/// allow four harmonics of the six that they resolve.
-const STATIONS_PER_UNKNOWN: f64 = 1.3;
-/// And of a readout and a table together: the table lives in the angle, and the readout in both. 27 stations allow offset,
-/// gain and skew beside four harmonics.
-const OBSERVATIONS_BESIDE_A_READOUT: usize = 4;
 /// Rows beyond which selection looks at every so many only.
 const ENOUGH_ROWS: usize = 1500;
 /// Kinds of readout that are offered every length of the table.
@@ -60,6 +53,9 @@ const DIRECTIONS_OF_MOTION: usize = 72;
 const LEAST_OF_ITS_OWN: f64 = 1e-2;
 /// … where this share of the rows at least stand where others do in another pass: a turn ends where it began.
 const MET_AGAIN: f64 = 0.2;
+/// Autocorrelation of an acceleration from one row to the next, from which on it goes on: engineering choice. White noise of the reference has
+/// -0.5.
+const GOES_ON: f64 = 0.5;
 
 /// A readout as it is fitted: what the library has of it, how angle and radius count, and which effects as text are there.
 pub(crate) type Front = (Kind, Weighting, Vec<EffectId>);
@@ -89,6 +85,9 @@ pub(crate) struct Selection<'a> {
     competing: Competing<'a>,
     /// directions of the sensor's period that rows stand in
     stations: usize,
+    /// a part of the period has no row
+    lacks_a_part: bool,
+    accelerates_smoothly: bool,
     /// what each readout makes of the rows when it is fitted without each fold
     without: BTreeMap<Option<Front>, Option<WithoutFolds>>,
 }
@@ -117,7 +116,20 @@ impl<'a> Selection<'a> {
         let folds = Folds::of(&runs, asked, sensor.gain.abs() * sensor.cycles);
         let starts = starts.to_vec();
         let stations = stations(sensor, &runs);
-        Self { sensor, runs, folds, rails, starts, competing, stations, without: BTreeMap::new() }
+        let angles = runs.iter().flat_map(|r| r.reference_rad.iter().copied());
+        let lacks_a_part = !Gap::all(angles, sensor.gain.abs() * sensor.cycles).is_empty();
+        Self {
+            sensor,
+            runs,
+            folds,
+            rails,
+            starts,
+            competing,
+            stations,
+            lacks_a_part,
+            accelerates_smoothly: accelerate_smoothly(fit_runs),
+            without: BTreeMap::new(),
+        }
     }
 
     /// Chooses a model, and after it a simpler one where that is as good within a wider tolerance; none where there is not
@@ -293,7 +305,7 @@ impl<'a> Selection<'a> {
             return self.motion_beyond_position(front, &all);
         }
         all.push(Motion::Rate);
-        if self.is_told_from_position(|s| s.acceleration) {
+        if self.is_told_from_position(|s| s.acceleration) && self.accelerates_smoothly {
             all.push(Motion::RateAndAcceleration);
         }
         self.motion_among(front, &all)
@@ -379,7 +391,8 @@ impl<'a> Selection<'a> {
             .filter_map(|(front, shape)| {
                 let of_texts = unknowns_of_texts(texts_of(front));
                 let size = of_readout(front) + shape.size();
-                if !stations_carry(self.stations, shape.order) || !self.rows_carry(front, shape, FEWEST_PER_UNKNOWN) {
+                let on_stations = self.is_held(front) || stations_carry(self.stations, shape.order);
+                if !on_stations || !self.rows_carry(front, shape, FEWEST_PER_UNKNOWN) {
                     return None;
                 }
                 let WithoutFolds { samples, of_radius } = self.without.get(front)?.as_ref()?;
@@ -392,9 +405,18 @@ impl<'a> Selection<'a> {
             .collect()
     }
 
+    /// The coefficients of an angle's table are held to what they usually are, as where a part of the period has no row: then rows need
+    /// not carry each of them.
+    fn is_held(&self, front: &Option<Front>) -> bool {
+        self.lacks_a_part && front.is_none()
+    }
+
     fn rows_carry(&self, front: &Option<Front>, shape: &Shape, per_unknown: usize) -> bool {
         let rows: usize = self.runs.iter().map(SensorRun::len).sum();
         let constant = Shape::constant(self.sensor.free_gain).size();
+        if self.is_held(front) {
+            return shape.size() + self.runs.len() <= rows;
+        }
         carries(rows, of_readout(front), shape.size() - constant, self.runs.len() + constant, per_unknown)
     }
 
@@ -463,43 +485,21 @@ impl<'a> Selection<'a> {
         let (best, aliases) = with.split_first()?;
         let distinct = |c: &Candidate<Model>| best.losses.is_distinct_from(&c.losses);
         // over a part of a turn a line stands in for a harmonic more of the table
-        let helps = if cover_a_turn(&samples) { Losses::is_better_than } else { Losses::is_distinct_from };
+        let helps = if cover_a_turn(&samples) && !self.lacks_a_part {
+            Losses::is_better_than
+        } else {
+            Losses::is_distinct_from
+        };
         (helps(&best.losses, &chosen.losses) && aliases.iter().all(distinct)).then(|| best.clone())
     }
 }
 
-/// Parts of a period that are directions of their own: far more than the harmonics of any table ask for, and fewer than rows of a turning
-/// sensor fill.
-const DIRECTIONS: usize = 1024;
-
-/// Directions of the period in which rows stand: of a sensor that turns as many as there are rows or parts, at stations as many as these
-/// are, however often each is recorded.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
-fn stations(sensor: &Sensor, runs: &[SensorRun]) -> usize {
-    let mut met = vec![false; DIRECTIONS];
-    for a in runs.iter().flat_map(|r| &r.reference_rad) {
-        // a station is in the middle of a part as a rule, and not on the edge of two
-        let part = (sensor.gain * sensor.cycles * a / std::f64::consts::TAU).rem_euclid(1.0) * DIRECTIONS as f64 + 0.5;
-        met[part as usize % DIRECTIONS] = true;
-    }
-    met.into_iter().filter(|met| *met).count()
-}
-
-/// Whether stations carry a table: a harmonic at or beyond half of them is zero at each, or one of the others, and rows that repeat a
-/// station say nothing more of it.
-fn stations_carry(stations: usize, order: usize) -> bool {
-    order == 0 || (2 * order + 1) as f64 * STATIONS_PER_UNKNOWN <= stations as f64
-}
-
-/// Whether so many rows observe enough for the unknowns of a readout and of a table, beside the constants of the angle.
-fn carries(rows: usize, of_readout: usize, of_table: usize, constants: usize, per_unknown: usize) -> bool {
-    let in_angle = |each: usize| (of_table + constants) * each <= rows;
-    let in_both = |each: usize| (of_readout + of_table + constants) * each <= 2 * rows;
-    match (of_readout, of_table) {
-        (0, _) => in_angle(per_unknown),
-        (_, 0) => in_both(OBSERVATIONS_PER_UNKNOWN),
-        _ => in_angle(OBSERVATIONS_PER_UNKNOWN) && in_both(OBSERVATIONS_BESIDE_A_READOUT),
-    }
+/// Whether an acceleration goes on from row to row: between stations, each held as long as it is, it does not.
+fn accelerate_smoothly(runs: &[SensorRun]) -> bool {
+    let pairs = runs.iter().flat_map(|r| r.acceleration_rad_s2.windows(2));
+    let (product, square) =
+        pairs.fold((0.0, 0.0), |(product, square), a| (product + a[0] * a[1], square + a[0] * a[0]));
+    product > GOES_ON * square
 }
 
 /// The short table beside which the lines are looked for as well, where a long one was chosen: on stations that are left out
@@ -545,13 +545,6 @@ pub(crate) fn fit_from(
 mod tests {
     use super::*;
     use crate::numerics::statistics::remembered;
-
-    #[test]
-    fn rows_carry_as_many_unknowns_as_they_observe() {
-        let least = |of_readout, of_table| (0..).find(|rows| carries(*rows, of_readout, of_table, 1, 3));
-        let affine = Kind::Affine.free().len();
-        assert_eq!([least(0, 8), least(affine, 0), least(affine, 8)], [Some(27), Some(8), Some(27)]);
-    }
 
     /// One turn in four moves between rests, in even rows of an angle that is off by these degrees.
     fn moved_between_rests(error_deg: impl Fn(usize, f64) -> f64) -> SensorRun {

@@ -151,7 +151,7 @@ impl TableFit {
         let free = Self::believing(shape, samples, runs, cycles, 0.0)?;
         let scatter = root_mean_square(&by_run(samples, runs, |s| s.error).concat());
         let largest = free.table.cos.iter().chain(&free.table.sin).fold(0.0, |m: f64, c| m.max(c.abs()));
-        let lacks_a_part = shape.order > 1 && Gap::of(samples.iter().map(|s| s.theta), cycles).is_some();
+        let lacks_a_part = shape.order > 1 && !Gap::all(samples.iter().map(|s| s.theta), cycles).is_empty();
         if !lacks_a_part && largest <= LARGEST_COEFFICIENT * scatter {
             return Some(free);
         }

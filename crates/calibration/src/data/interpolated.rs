@@ -8,7 +8,8 @@ use crate::data::plausibility::{Findings, leave_out as leave_out_rows, places, s
 use crate::numerics::statistics::inner_range;
 use crate::recording::Recording;
 
-/// A row is on the chord where it is off by less than this share of the sagitta: what is drawn is off by rounding alone.
+/// A row is on the chord where it is off by less than this share of the sagitta, and by no more than rounding: channels that saturate run
+/// straighter than a circle, and not that straight.
 const ON_THE_CHORD: f64 = 0.1;
 /// A sagitta tells where it is this many times the resolution of a channel: below, a coarse converter draws chords as well.
 const RESOLVED: f64 = 4.0;
@@ -51,7 +52,7 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
     let mut drawn = vec![false; rows];
     let circle = as_a_circle(x, y);
     let (x, y) = circle.as_ref().map_or((x, y), |[x, y]| (x.as_slice(), y.as_slice()));
-    let least = RESOLVED * f64::max(resolution(x), resolution(y));
+    let rounding = RESOLVED * f64::max(resolution(x), resolution(y));
     let mut judged = 0;
     for i in 1..rows.saturating_sub(1) {
         let share = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
@@ -61,9 +62,9 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
         // a channel that stands still is another fault
         let both_move = x[i] != x[i - 1] && y[i] != y[i - 1];
         let sagitta = chord * chord / (8.0 * amplitude);
-        if both_move && sagitta > least {
+        if both_move && sagitta > rounding {
             judged += 1;
-            drawn[i] = off(x).hypot(off(y)) < ON_THE_CHORD * sagitta;
+            drawn[i] = off(x).hypot(off(y)) < rounding.min(ON_THE_CHORD * sagitta);
         }
     }
     let found = drawn.iter().filter(|on| **on).count();
