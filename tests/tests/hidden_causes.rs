@@ -225,3 +225,21 @@ fn at_one_rate_what_no_cause_is_told_of_is_a_harmonic() {
     assert_eq!(found(&i, Origin::Empirical), ["harmonic-n"], "{:?}", i.report.effects);
     assert!(found(&i, Origin::Discovered).is_empty(), "{:?}", i.report.effects);
 }
+
+/// At one amplitude the channels' cubics can't be told apart, and a difference of them is a detection ratio, which the interval holds.
+#[test]
+fn at_one_amplitude_the_detection_ratio_holds_what_unlike_cubics_make() {
+    for difference in [1.5e-3, -1.5e-3] {
+        let mut settings = drives_are_late(0.0, &[500.0, -500.0, 200.0, 60.0, 350.0], 3);
+        settings.effects.push(effect(EffectId::DetectionCubic, &[0.02, difference]));
+        settings.effects.sort_by_key(|e| e.id);
+        let identified = identify(settings).unwrap();
+        let ratio = identified.report.detection_gain_ratio.unwrap();
+        assert!(holds(&ratio, 1.0132) && ratio.half_width() < 4e-3, "{ratio:?}");
+        assert!(
+            found(&identified, Origin::Discovered).contains(&"detection-cubic"),
+            "{:#?}",
+            identified.report.effects
+        );
+    }
+}

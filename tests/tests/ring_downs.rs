@@ -291,3 +291,48 @@ fn ring_downs_that_agree_by_themselves_are_kept_beside_rotations_that_lack_an_ef
     assert!(warnings.iter().all(|w| !w.contains("another device")), "{warnings:#?}");
     assert!(identified.report.effects.iter().any(|e| e.id == "detection-cubic"), "{:#?}", identified.report.effects);
 }
+
+/// The same campaign by a clock that counts seconds since 1970: a drift that is too small to be seen is no larger for it.
+#[test]
+fn a_clock_that_begins_far_from_zero_changes_no_interval() {
+    let began = 1_700_000_000.0;
+    let from_zero = identified(recorded(settings())).unwrap();
+    let mut campaign = recorded(settings());
+    for run in &mut campaign.runs {
+        run.recording.t_s.iter_mut().for_each(|t| *t += began);
+        if let RunKind::Ringdown { energy_off_s, .. } = &mut run.kind {
+            *energy_off_s += began;
+        }
+    }
+    let since_1970 = identified(campaign).unwrap();
+    let of = |i: &Identification| {
+        [Some(i.report.angular_gain), i.report.detection_gain_ratio, i.report.actuation_gain_ratio].map(Option::unwrap)
+    };
+    for (a, b) in of(&from_zero).iter().zip(of(&since_1970)) {
+        // such a clock tells times to 0.24 µs, and the pattern turns by 1e-4° meanwhile
+        assert!((a.value - b.value).abs() < 0.05 * a.half_width(), "{a:?} {b:?}");
+        assert!((a.half_width() / b.half_width() - 1.0).abs() < 0.1, "{a:?} {b:?}");
+    }
+}
+
+/// Noise of the recorder alone makes a trend of the amplitude that is held, and the drive is corrected for it: the ratio is told no better
+/// than that trend.
+#[test]
+fn the_ratio_of_the_drives_is_told_no_better_than_the_trend_of_what_is_held() {
+    let count = 12;
+    let inside = all(count, |seed| {
+        let mut settings = settings();
+        settings.seed = seed;
+        settings.tau_s = 300.0;
+        let mut campaign = recorded(settings);
+        let mut draw = Draws::new(seed);
+        for run in ring_downs(&mut campaign) {
+            let mut noise = || 4e-4 * (0..12).map(|_| draw.between(-0.5, 0.5)).sum::<f64>();
+            let columns = [&mut run.recording.xc_v, &mut run.recording.yc_v];
+            columns.into_iter().flatten().flatten().for_each(|v| *v += noise());
+        }
+        holds(&identified(campaign).unwrap().report.actuation_gain_ratio.unwrap(), RATIO)
+    });
+    let inside = inside.into_iter().filter(|held| *held).count();
+    assert!(inside >= 10, "{inside} of {count}");
+}

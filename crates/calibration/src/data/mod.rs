@@ -4,6 +4,7 @@
 
 pub(crate) mod agreement;
 pub(crate) mod channel_ranges;
+pub(crate) mod clock;
 pub(crate) mod copies;
 pub(crate) mod held_reference;
 pub(crate) mod interpolated;

@@ -12,7 +12,7 @@ use crate::data::track::commanded;
 use crate::error::Refusal;
 use crate::model::hypothesis::Hypothesis;
 use crate::numerics::angles::wrapped;
-use crate::numerics::statistics::{line, robust_deviation};
+use crate::numerics::statistics::robust_deviation;
 use crate::recording::{Run, RunKind};
 
 /// What one ring-down tells.
@@ -211,7 +211,8 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     let level = crate::numerics::statistics::median(&mut on.ln_a.clone());
     on.drop_spikes(|_| level);
     // On: ȧ/a = −1/τ − G v_as/a, so the command that would hold the amplitude still is v − v·(ȧ/a)/(1/τ + ȧ/a).
-    let (trend, _) = line(&on.t_s, &on.ln_a);
+    let held = Decay::of(&on.t_s, &on.ln_a);
+    let (trend, trend_error) = (-held.rate, held.error.hypot(held.uneven_error));
     let mean = on.command.iter().sum::<f64>() / on.len() as f64;
     let hold = |rate: f64| mean * rate / (rate + trend);
     let decayed = damping(&off, hold);
@@ -233,7 +234,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         tau_error_s: decayed.error.hypot(decayed.uneven_error) / (rate * rate),
         uneven: decayed.uneven,
         drive: hold(rate),
-        drive_error: STUDENT_11 * mean_error(&on.command, mean),
+        drive_error: (STUDENT_11 * mean_error(&on.command, mean)).hypot(hold(rate) * trend_error / (rate + trend)),
         decay,
     })
 }

@@ -460,7 +460,7 @@ fn command_rms(tracks: &[Prepared]) -> [f64; 2] {
 }
 
 /// A hypothesis fitted, and what the ring-downs said.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Fitted {
     pub(crate) fit: Fit,
     pub(crate) ring_downs: Vec<RingDown>,
@@ -470,7 +470,7 @@ pub(crate) struct Fitted {
 
 /// What a fit leaves the runs weighted by, for those that go on from it: noise, its white part, limits and starts of every run,
 /// what the balances tell, and whether the drive is adjusted.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Weighting {
     runs: Vec<([Noise; 3], Vec<Start>)>,
     energy_balance: Option<(f64, f64)>,

@@ -10,10 +10,11 @@ use cvg_model::effects::EffectId;
 
 use crate::error::Refusal;
 use crate::estimation::actuation::{RingDown, ring_down};
+use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
-use crate::model::hypothesis::Hypothesis;
+use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::median;
+use crate::numerics::statistics::{line, median, robust_deviation};
 use crate::recording::{Role, Run};
 
 /// A ring-down takes no drive that differs by a larger share than this from what the rotations take: gains of the axes that
@@ -30,12 +31,29 @@ const OWN_UNKNOWNS: usize = 3;
 const OWN_DEVIATIONS: f64 = 3.0;
 const LEAST_TAU_ERROR: f64 = 1e-3;
 const LARGEST_OWN: f64 = 0.15;
+/// What is read of an amplitude that is held goes up and down by so many of its deviations.
+const RANGE: f64 = 3.0;
 /// The command that holds a pattern against what turns it is at most so many times the energy command.
 const LARGEST_HOLD: f64 = 2.0;
 /// Runs that differ in temperature by more than this differ in their damping.
 const SAME_TEMPERATURE_K: f64 = 5.0;
 /// Samples of a run that tell how strongly it was driven.
 const LOOKED_AT: usize = 2000;
+
+/// What the usual rotation takes to hold its amplitude.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    /// −v_as/a, 1/1
+    mean: f64,
+    /// by how much that may be off where the amplitude is not read as it is, or not held: what is left of ln a, had it gone with time
+    allowance: f64,
+}
+
+/// What is left of `y` about its best line.
+fn about_a_line<'a>(x: &'a [f64], y: &'a [f64]) -> impl Iterator<Item = f64> + use<'a> {
+    let (slope, intercept) = line(x, y);
+    x.iter().zip(y).map(move |(x, y)| y - intercept - slope * x)
+}
 
 impl Dataset {
     /// Says no where the rotations take no energy command that could replace the damping which the ring-downs show.
@@ -44,8 +62,8 @@ impl Dataset {
     /// Where a ring-down is not one, or what the rotations take replaces no damping at all.
     pub(crate) fn require_driven_rotations(&self, hypothesis: &Hypothesis) -> Result<(), Refusal> {
         let all = self.ring_downs(hypothesis)?;
-        let undriven = |usual: &f64| all.iter().all(|r| *usual < LEAST_DRIVE * -r.drive);
-        let (Some(first), Some(usual)) = (all.first(), self.usual_drive(hypothesis).filter(undriven)) else {
+        let undriven = |usual: &Drive| all.iter().all(|r| usual.mean + usual.allowance < LEAST_DRIVE * -r.drive);
+        let (Some(first), Some(usual)) = (all.first(), self.usual_drive(hypothesis, &all).filter(undriven)) else {
             return Ok(());
         };
         Err(Refusal::no_answer(
@@ -53,25 +71,27 @@ impl Dataset {
             format!(
                 "the ring-downs take an energy command of {:.4} per amplitude, the rotations {:.4} in the mean: that does \
                  not replace one damping",
-                first.drive, -usual
+                first.drive, -usual.mean
             ),
             "vas_v and vqc_v in their places in the rotations, in one unit, and ring-downs of the same device",
         ))
     }
 
     /// Leaves out ring-downs that are of another instrument than the rotations, or of another than each other, by name;
-    /// whether there were any. `hypothesis` is what the campaign was found to be: before its anisodamping and the skew of
+    /// whether there were any. `fit` is what the campaign was found to be: before its anisodamping and the skew of
     /// its drives are known, sound ring-downs differ as much.
     ///
     /// # Errors
     /// Where a ring-down is not one.
-    pub(crate) fn without_foreign_ring_downs(&mut self, hypothesis: &Hypothesis) -> Result<bool, Refusal> {
+    pub(crate) fn without_foreign_ring_downs(&mut self, fit: &Fit) -> Result<bool, Refusal> {
+        let hypothesis = &fit.hypothesis;
         let all = self.ring_downs(hypothesis)?;
-        let usual = self.usual_drive(hypothesis);
+        let usual = self.usual_drive(hypothesis, &all);
         let through_skew = through_skew(hypothesis);
-        let usual = usual.filter(|d| *d > 0.0);
-        let share = |r: &RingDown| usual.map(|usual| -r.drive / usual - 1.0);
-        let is_off = |share: &f64| share.abs() > LARGEST_SHARE + through_skew;
+        let usual = usual.filter(|d| d.mean > 0.0);
+        let share = |r: &RingDown| usual.map(|usual| -r.drive / usual.mean - 1.0);
+        let unsure = usual.map_or(0.0, |usual| usual.allowance / usual.mean);
+        let is_off = |share: &f64| share.abs() > LARGEST_SHARE + through_skew + unsure;
         let mut odd: Vec<(usize, String)> = Vec::new();
         // where no ring-down agrees with them, the rotations are what is odd: beside a large split they take more
         if all.iter().any(|r| share(r).is_some_and(|s| !is_off(&s))) {
@@ -85,7 +105,7 @@ impl Dataset {
             ));
         }
         if odd.is_empty() && self.tracks_differ() && !agree_by_themselves(&all) {
-            odd = contradictions(&all, hypothesis, usual);
+            odd = contradictions(&all, fit, usual.map(|usual| usual.mean));
         }
         for (at, why) in odd.iter().rev() {
             let name = crate::data::track::run_name(&self.ring_down_runs[*at]);
@@ -106,25 +126,36 @@ impl Dataset {
         self.ring_down_runs.iter().map(evaluated).collect()
     }
 
-    /// The mean of −v_as/a over the directions, 1/1, of the usual rotation, less what v_qc does of it; `None` where it was not
-    /// recorded.
-    fn usual_drive(&self, hypothesis: &Hypothesis) -> Option<f64> {
+    /// The mean of −v_as/a over the directions, 1/1, of the usual rotation, less what v_qc does of it and less what it takes to let the
+    /// amplitude grow, by the gain of the drives that the ring-downs show; `None` where it was not recorded.
+    fn usual_drive(&self, hypothesis: &Hypothesis, ring_downs: &[RingDown]) -> Option<Drive> {
+        let inverse_gain = median(&mut ring_downs.iter().map(|r| -r.tau_s * r.drive).collect::<Vec<_>>());
         let fitted = self.tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0);
         let means = fitted.filter(|t| t.has_commands() && t.has_amplitude()).filter_map(|t| {
             let stride = (t.t_s.len() / LOOKED_AT).max(1);
             let rows = t.segments.iter().flat_map(|s| s.range.clone()).step_by(stride);
-            let taken = rows.filter_map(|i| {
+            let (mut t_s, mut ln_a, mut sum) = (Vec::new(), Vec::new(), 0.0);
+            for i in rows {
                 let p = hypothesis.unread(t.envelope(i), &t.moment(i, 0.0)).pendulum();
-                let v = t.commands(i, stride)?.now;
+                let Some(v) = t.commands(i, stride).map(|v| v.now) else { continue };
                 // what holds a split works on the ellipse that a quadrature loop of finite bandwidth leaves
-                let work = 0.5 * v.v_qc * p.q / p.e.powf(1.5);
-                Some(work - v.v_as / p.e.sqrt()).filter(|d| d.is_finite())
-            });
-            let (sum, n) = taken.fold((0.0, 0.0), |(sum, n), d| (sum + d, n + 1.0));
-            (n > 0.0).then(|| sum / n)
+                let taken = 0.5 * v.v_qc * p.q / p.e.powf(1.5) - v.v_as / p.e.sqrt();
+                if taken.is_finite() {
+                    t_s.push(t.t_s[i]);
+                    ln_a.push(0.5 * p.e.ln());
+                    sum += taken;
+                }
+            }
+            let lasted = t_s.last()? - t_s.first()?;
+            Some(Drive {
+                mean: sum / t_s.len() as f64 - inverse_gain * line(&t_s, &ln_a).0,
+                allowance: RANGE * inverse_gain.abs() * robust_deviation(about_a_line(&t_s, &ln_a))
+                    / lasted.max(f64::MIN_POSITIVE),
+            })
         });
-        let mut means: Vec<f64> = means.collect();
-        (!means.is_empty()).then(|| median(&mut means))
+        let (mut means, mut allowances): (Vec<f64>, Vec<f64>) =
+            means.map(|drive| (drive.mean, drive.allowance)).unzip();
+        (!means.is_empty()).then(|| Drive { mean: median(&mut means), allowance: median(&mut allowances) })
     }
 
     fn differs_in_temperature(&self, run: &Run) -> bool {
@@ -149,6 +180,14 @@ fn through_skew(hypothesis: &Hypothesis) -> f64 {
 fn anisodamping(r: &RingDown, hypothesis: &Hypothesis) -> f64 {
     let [cos, sin] = hypothesis.member(EffectId::Anisodamping).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
     0.5 * (cos * (2.0 * r.angle_rad).cos() + sin * (2.0 * r.angle_rad).sin())
+}
+
+/// Standard deviation of a fitted anisodamping, 1/s; 0 where there is none.
+fn anisodamping_deviation(fit: &Fit) -> f64 {
+    let member = fit.hypothesis.position(EffectId::Anisodamping);
+    let of = |u: &Unknown| matches!(u, Unknown::Effect(at, _) if Some(*at) == member);
+    let variances = (0..fit.unknowns.len()).filter(|i| of(&fit.unknowns[*i])).map(|i| fit.covariance[(i, i)].max(0.0));
+    variances.sum::<f64>().sqrt()
 }
 
 /// By which share the dampings of ring-downs, less the anisodamping, differ at most.
@@ -186,12 +225,15 @@ fn agree_by_themselves(all: &[RingDown]) -> bool {
 
 /// Ring-downs whose damping, less the anisodamping, is not that of the others. Of two, the one that takes another drive than
 /// the rotations is odd; where nothing tells, both are.
-fn contradictions(all: &[RingDown], hypothesis: &Hypothesis, usual: Option<f64>) -> Vec<(usize, String)> {
+fn contradictions(all: &[RingDown], fit: &Fit, usual: Option<f64>) -> Vec<(usize, String)> {
+    let hypothesis = &fit.hypothesis;
     let own = |r: &RingDown| anisodamping(r, hypothesis);
+    // of two dampings at right angles, by what is not known of the anisodamping
+    let unknown = anisodamping_deviation(fit);
     let damping: Vec<f64> = all.iter().map(|r| 1.0 / r.tau_s - own(r)).collect();
     let deviation = |r: &RingDown| r.tau_error_s / (r.tau_s * r.tau_s);
     let agree = |a: usize, b: usize| {
-        let within = DEVIATIONS * deviation(&all[a]).hypot(deviation(&all[b]));
+        let within = DEVIATIONS * deviation(&all[a]).hypot(deviation(&all[b])).hypot(unknown);
         let same = (SAME_DAMPING + through_skew(hypothesis)) * 0.5 * (damping[a] + damping[b]);
         (damping[a] - damping[b]).abs() <= within.max(same)
     };

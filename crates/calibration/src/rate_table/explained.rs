@@ -14,7 +14,8 @@ use crate::recording::Role;
 use crate::selection::discovery::discover;
 use crate::selection::step::Accepted;
 
-/// A fit with drives that clip may leave this many times the mean square of the fitted runs that the one without leaves: engineering choice.
+/// A fit with drives that clip, or with what was discovered, may leave this many times the mean square of the fitted runs that the one
+/// without leaves: engineering choice.
 const WORSE: f64 = 1.1;
 /// One with every run counted leaves this share at most, half the rms: engineering choice.
 const FAR_LESS: f64 = 0.25;
@@ -41,7 +42,7 @@ pub(super) fn explained(
     if dataset.gives_a_run_up() {
         found = found.with_every_run_counted(dataset, paper, options)?;
     }
-    if dataset.without_foreign_ring_downs(&found.fitted.fit.hypothesis)? {
+    if dataset.without_foreign_ring_downs(&found.fitted.fit)? {
         (options.progress)("beginning anew without the ring-downs of another device");
         found = Explained::from(dataset, paper, options)?;
     }
@@ -56,12 +57,20 @@ pub(super) fn explained(
 }
 
 impl Explained {
+    /// With what is discovered, unless fits on the way to it ended where more is left than without.
     fn from(dataset: &mut Dataset, declared: &Hypothesis, options: &Options<'_>) -> Result<Self, Refusal> {
-        let declared = fit_with_ring_downs(dataset, declared)?;
-        let declared_fit = declared.fit.clone();
-        let (fitted, steps) =
-            if options.discover { discover(dataset, declared, options.progress)? } else { (declared, Vec::new()) };
-        Ok(Self { declared_fit, fitted, steps })
+        let fitted = fit_with_ring_downs(dataset, declared)?;
+        let declared = Self { declared_fit: fitted.fit.clone(), fitted, steps: Vec::new() };
+        if !options.discover {
+            return Ok(declared);
+        }
+        let (fitted, steps) = discover(dataset, declared.fitted.clone(), options.progress)?;
+        let found = Self { declared_fit: declared.declared_fit.clone(), fitted, steps };
+        if found.left(dataset) <= WORSE * declared.left(dataset) {
+            return Ok(found);
+        }
+        dataset.restore(&declared.fitted);
+        Ok(declared)
     }
 
     /// Begun anew where a run was given up for the sake of the others; this, where that leaves more.

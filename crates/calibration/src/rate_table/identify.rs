@@ -1,6 +1,7 @@
 //! A campaign of rotations and ring-downs walked through the rooms, in this order: data, estimation, selection, the last step,
 //! and what is left.
 
+use crate::data::clock::from_the_first_row;
 use crate::diagnostics::drives::clipping;
 use crate::diagnostics::scale_factor::scale_factor_of;
 use crate::error::Refusal;
@@ -20,7 +21,12 @@ use crate::selection::refuted::take_back_the_refuted;
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
-pub(crate) fn identify(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+pub(crate) fn identify(
+    mut campaign: Campaign,
+    options: &Options<'_>,
+    with_plots: bool,
+) -> Result<Identification, Refusal> {
+    from_the_first_row(&mut campaign);
     let head = Head {
         device: campaign.device.clone(),
         runs: campaign.runs.iter().map(run_report).collect(),

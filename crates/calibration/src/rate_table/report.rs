@@ -22,6 +22,7 @@ use crate::report::channels::channels;
 use crate::report::gate::{self, Facts};
 use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
+use crate::report::recorded::set_aside;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
@@ -236,9 +237,7 @@ impl Found {
         let spikes: Vec<usize> =
             fit.set_aside.iter().enumerate().map(|(track, fit)| fit + after.spikes_of(track)).collect();
         let all_spikes: usize = spikes.iter().sum();
-        if all_spikes > 0 {
-            warnings.push(format!("{all_spikes} samples were set aside as spikes"));
-        }
+        warnings.extend(set_aside(all_spikes, "sample"));
         warnings.extend(tell_apart(&mut runs, &self.dataset, fit, (&self.errors.on_fit, after)));
         let screen = &self.dataset.screen;
         let spikes = spikes.into_iter().zip(screen.spikes()).map(|(set_aside, mended)| set_aside + mended);

@@ -46,6 +46,8 @@ const OTHER_DAMPING: f64 = 0.01;
 const CONTRADICTED: f64 = 3.0;
 /// A drift that contradicts what is believed of drifts, in standard deviations of that: 1 in 100.
 const UNBELIEVED: f64 = 2.33;
+/// Cubics of the two channels differ by this share of them at most, as where the gaps of their plates differ by a tenth: engineering choice.
+const UNLIKE_CUBICS: f64 = 0.2;
 
 /// An estimate from all runs whose interval also covers what single runs contradict it with, each with its standard
 /// deviation, beyond so many of them: the fit takes what runs differ in for noise, and many samples make little of that. Says
@@ -190,16 +192,28 @@ impl Inference<'_> {
         })
     }
 
-    /// What has to be said of a gain ratio beside a cubic of the readout at one amplitude: the two channels are taken to have the
-    /// same cubic, and a difference δ of them reads as a ratio of 1 + ¾ δ a² there.
-    pub(crate) fn cubics_that_may_differ(&self) -> Option<String> {
-        let cubic = self.hypothesis().member(EffectId::DetectionCubic).filter(|m| !m.refined)?;
+    /// The cubic of a readout at one amplitude beside its gain ratio: the two channels are taken to have the same one, and a
+    /// difference δ of them reads as a ratio of 1 + ¾ δ a² there.
+    fn cubic_of_both_channels(&self) -> Option<f64> {
+        let cubic = self.hypothesis().member(EffectId::DetectionCubic).filter(|m| !m.refined && m.values[0] != 0.0)?;
         let ratio = self.first(EffectId::DetectionGainMismatch).filter(|_| self.dataset.alike().amplitude);
-        ratio.filter(|_| cubic.values[0] != 0.0).map(|_| {
-            "the detection gain ratio stands beside a cubic that is taken to be the same in both channels, and all runs are at one \
-             amplitude: a difference of the cubics would be part of the ratio, as it is at this amplitude; a run at another amplitude \
-             would separate them"
-                .into()
+        ratio.map(|_| cubic.values[0])
+    }
+
+    /// What cubics that differ may make of the detection gain ratio.
+    fn by_unlike_cubics(&self) -> f64 {
+        let amplitude = self.dataset.usual_amplitude();
+        self.cubic_of_both_channels().map_or(0.0, |kappa| 0.75 * UNLIKE_CUBICS * kappa.abs() * amplitude * amplitude)
+    }
+
+    /// What has to be said of a gain ratio beside a cubic of the readout at one amplitude.
+    pub(crate) fn cubics_that_may_differ(&self) -> Option<String> {
+        self.cubic_of_both_channels().map(|_| {
+            format!(
+                "the detection gain ratio stands beside a cubic that is taken to be the same in both channels, and all runs are at one \
+                 amplitude: a difference of the cubics is part of the ratio, whose interval allows for {UNLIKE_CUBICS} of them; a run at \
+                 another amplitude would separate them"
+            )
         })
     }
 
@@ -256,7 +270,8 @@ impl Inference<'_> {
         }
         let runs = self.dataset.tracks.iter().map(|t| t.track.file.as_str()).zip(own.iter().copied());
         let unbelieved = self.first(EffectId::DetectionGainMismatch).map_or(0.0, |u| self.beyond_belief(u));
-        let identified = identified.map(|ratio| ratio.widened(self.held_by_harmonics() + unbelieved));
+        let identified =
+            identified.map(|ratio| ratio.widened(self.held_by_harmonics() + unbelieved + self.by_unlike_cubics()));
         let ratio = covering(identified?, "detection gain ratio", runs, CONTRADICTS, warnings);
         Some(self.borne_out(ratio, warnings))
     }

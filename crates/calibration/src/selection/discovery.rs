@@ -235,9 +235,17 @@ fn choose(trials: &[Trial], apart: Distinguishable) -> Option<(&Trial, Origin, V
         .filter(|t| !empirical(t) && t.candidate.id != library.candidate.id && t.gain > library.gain - LEAST_LEAD)
         .filter(|t| !told_from(library, t))
         .collect();
-    // At one rate only the energy balance tells a slow push on the pattern from a fault of the readout.
+    // At one rate only the energy balance tells a slow push on the pattern, by the mechanics or the drives, from a fault of the readout.
     let by_amplitude = trials.iter().filter(|t| t.candidate != library.candidate).all(|t| told_from(library, t));
-    let told = apart.rates || by_amplitude || library.candidate.id.description().stage != Stage::Mechanics;
+    let pushes = matches!(library.candidate.id.description().stage, Stage::Mechanics | Stage::Actuation);
+    let told = apart.rates || by_amplitude || !pushes;
+    // a rotation that the reference does not hold is a cause as well, of which no more can be said
+    let unrecorded = |t: &&Trial| {
+        empirical(t) && t.candidate.id.description().stage == Stage::Input && t.gain > library.gain - LEAST_LEAD
+    };
+    if let Some(unrecorded) = trials.iter().find(unrecorded).filter(|t| !told_from(library, t)) {
+        return Some((unrecorded, Origin::Empirical, vec![library.candidate.id]));
+    }
     let rivals: Vec<EffectId> = rivals.into_iter().map(|t| t.candidate.id).collect();
     if rivals.is_empty() && told {
         return Some((library, Origin::Discovered, rivals));

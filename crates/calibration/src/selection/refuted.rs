@@ -26,34 +26,43 @@ pub(crate) fn take_back_the_refuted(
     fitted: &mut Fitted,
     steps: &mut Vec<Accepted>,
 ) -> Result<bool, Refusal> {
-    let held_out = |state: &State| {
-        evaluate(&dataset.tracks, &state.hypothesis, &state.starts, Role::Holdout, Window::Whole, None)
-            .mean_square()
-            .sqrt()
-    };
-    let after = held_out(&State::of(&fitted.fit));
-    let before: Vec<f64> = steps.iter().map(|s| held_out(&s.states[0])).collect();
+    let after = held_out(dataset, &State::of(&fitted.fit));
+    let before: Vec<f64> = steps.iter().map(|s| held_out(dataset, &s.states[0])).collect();
     let Some(kept) = (0..steps.len()).min_by(|&a, &b| before[a].total_cmp(&before[b])) else { return Ok(false) };
     if after <= REFUTED * before[kept] {
         return Ok(false);
     }
-    let refuted: Vec<String> = steps[kept..].iter().map(|s| s.id.to_string()).collect();
+    let mut hypothesis = steps[kept].states[0].hypothesis.clone();
+    // what came in before and went out after it is nobody's
+    let of_a_step: Vec<bool> = (0..hypothesis.members.len())
+        .map(|at| {
+            hypothesis.members[at].origin == Origin::Declared || step_of(&hypothesis, at, &steps[..kept]).is_some()
+        })
+        .collect();
+    let mut stays = of_a_step.iter();
+    hypothesis.members.retain(|_| stays.next().is_some_and(|&s| s));
+    let without = fit_with_ring_downs(dataset, &hypothesis)?;
+    let left = held_out(dataset, &State::of(&without.fit));
+    if after <= REFUTED * left {
+        // fitted anew, the model without them is no better
+        dataset.restore(fitted);
+        return Ok(false);
+    }
+    let refuted: Vec<String> = steps.drain(kept..).map(|s| s.id.to_string()).collect();
     let what = format!(
         "{} taken back: the fitted runs ask for it, and the held-out error is {:.3e}° with it and {:.3e}° without; what is \
          stated of the held-out run has had this say",
         refuted.join(", "),
         after.to_degrees(),
-        before[kept].to_degrees()
+        left.to_degrees()
     );
     dataset.warnings.push(what);
-    let mut hypothesis = steps[kept].states[0].hypothesis.clone();
-    steps.truncate(kept);
-    // what came in before and went out after it is nobody's
-    let of_a_step: Vec<bool> = (0..hypothesis.members.len())
-        .map(|at| hypothesis.members[at].origin == Origin::Declared || step_of(&hypothesis, at, steps).is_some())
-        .collect();
-    let mut stays = of_a_step.iter();
-    hypothesis.members.retain(|_| stays.next().is_some_and(|&s| s));
-    *fitted = fit_with_ring_downs(dataset, &hypothesis)?;
+    *fitted = without;
     Ok(true)
+}
+
+/// rms of the held-out error of a state, rad.
+fn held_out(dataset: &Dataset, state: &State) -> f64 {
+    let held_out = evaluate(&dataset.tracks, &state.hypothesis, &state.starts, Role::Holdout, Window::Whole, None);
+    held_out.mean_square().sqrt()
 }
