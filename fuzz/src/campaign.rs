@@ -20,6 +20,7 @@ static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
     let film = "t_s,x_v,y_v\n0,1,2\n1,2,3\n2,1,1\n";
     let angle = "t_s,theta_deg\n0,1\n1,2\n2,3\n";
     let pair = "t_s,xc_v,yc_v,temp_c\n0,1,0,20\n1,0,1,21\n2,-1,0,22\n";
+    let turned = "t_s,xc_v,xs_v,yc_v,ys_v,vas_v,vqc_v,virtual_dps\n0,1,0,0,0,-0.1,0,10\n1,0.9,0,0.1,0,-0.1,0,10\n2,0.8,0,0.2,0,-0.1,0,10\n";
     let foreign =
         "Time (ms),Gyro (rad/s),Pos [mrad],A (mV),B (counts)\n0,0,0,1,2\n500,1,1,2,1\n700,,1,3,3\n1000,1,2,1,2\n";
     let files = [
@@ -29,6 +30,7 @@ static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
         ("angle.csv", angle),
         ("pair.csv", pair),
         ("foreign.csv", foreign),
+        ("turned.csv", turned),
     ];
     for (name, text) in files {
         fs::write(folder.path().join(name), text).expect("a temporary file");
