@@ -1,5 +1,6 @@
 //! Where the angle of a rate gyroscope and its reference part from one row to the next and stay apart: a table that was
-//! zeroed, an encoder that lost counts, an integral that was begun anew. No rate is behind it, and no scale factor either.
+//! zeroed, an encoder that lost counts, an integral that was begun anew. No rate is behind it, no scale factor, and no bias either, which
+//! makes of a gap in the recording as much as the gap is long.
 //!
 //! A table that turns back from one row to the next parts from an angle that is late by a part of a row as well, or from one
 //! that was summed by another rule. That goes with the change of the rate, row by row, and is a lag's.
@@ -7,6 +8,7 @@
 use crate::data::slips::slips;
 use crate::data::table::{integrated, turned};
 use crate::numerics::angles::unwrapped;
+use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{median, span};
 use crate::recording::Run;
 
@@ -16,6 +18,14 @@ const PARTS: usize = 50;
 const TOGETHER: usize = 2;
 /// What being late makes of a row is no more than the change of the step there, and the noise of a row.
 const LATE: f64 = 1.05;
+/// Rounds of least squares after which weights by one over the size leave the least absolute sum, and the share of what is usually left
+/// below which none is weighed more.
+const ROUNDS: usize = 20;
+const LEAST_LEFT: f64 = 0.1;
+/// A step that takes so many times the usual interval is a gap, in which an angle may drift twice as fast as in nine of ten parts of a run.
+const GAP: f64 = 1.5;
+const MOST_PARTS: f64 = 0.9;
+const FASTER: f64 = 2.0;
 /// Rows on either side of a jump that tell how far a step usually goes.
 const BESIDE: usize = 12;
 
@@ -29,11 +39,13 @@ pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
         (None, Some(rate)) => integrated(&r.t_s[settled.clone()], &rate[settled.clone()]),
         (None, None) => return Vec::new(),
     };
-    let Some(gain) = gain(&theta, &reference) else { return Vec::new() };
-    let expected: Vec<f64> = reference.iter().map(|a| gain * a).collect();
+    let t_s = r.t_s[settled.clone()].to_vec();
+    let Some([gain, bias]) = gain_and_bias(&theta, &reference, &t_s) else { return Vec::new() };
+    let expected: Vec<f64> = reference.iter().zip(&t_s).map(|(a, t)| gain * a + bias * (t - t_s[0])).collect();
+    let drifts = drifts_in_gaps(&theta, &expected, &t_s);
     let mut jumps: Vec<Jump> = Vec::new();
     for slip in slips(&theta, &expected, period) {
-        if slip.by.abs() <= LATE * change_of_step(&expected, slip.at) {
+        if slip.by.abs() <= (LATE * change_of_step(&expected, slip.at)).max(drifts(slip.at)) {
             continue;
         }
         let row = settled.start + slip.at;
@@ -75,15 +87,47 @@ fn radians(degrees: &[f64], period: f64) -> Vec<f64> {
     unwrapped(degrees.iter().map(|d| d.to_radians()), period)
 }
 
-/// How far the angle goes with the reference: the median over parts of the run, of which a jump is in few.
-fn gain(theta: &[f64], reference: &[f64]) -> Option<f64> {
+/// How far the angle goes with the reference, and its bias, rad/s: what leaves the least of the increments over parts of the run, each
+/// counted by its size and not its square, since a jump is in few.
+fn gain_and_bias(theta: &[f64], reference: &[f64], t_s: &[f64]) -> Option<[f64; 2]> {
     let width = (theta.len() / PARTS).max(1);
     let increments = |v: &[f64]| (width..v.len()).map(|i| v[i] - v[i - width]).collect::<Vec<f64>>();
-    let (theta, reference) = (increments(theta), increments(reference));
-    let usual = median(&mut reference.iter().map(|d| d.abs()).collect::<Vec<_>>());
-    let mut ratios: Vec<f64> =
-        theta.iter().zip(&reference).filter(|(_, d)| d.abs() >= usual && **d != 0.0).map(|(t, d)| t / d).collect();
-    (!ratios.is_empty()).then(|| median(&mut ratios)).filter(|g| g.is_finite() && *g != 0.0)
+    let (theta, reference, t_s) = (increments(theta), increments(reference), increments(t_s));
+    let rows = || theta.iter().zip(&reference).zip(&t_s);
+    let mut told = [0.0; 2];
+    let mut weights = vec![1.0; theta.len()];
+    for _ in 0..ROUNDS {
+        let mut equations = NormalEquations::new(2);
+        for (((t, a), dt), weight) in rows().zip(&weights) {
+            equations.add(&[weight * a, weight * dt], weight * t);
+        }
+        told = equations.solve().try_into().ok()?;
+        let off = |((t, a), dt): ((&f64, &f64), &f64)| (t - told[0] * a - told[1] * dt).abs();
+        let left: Vec<f64> = rows().map(off).collect();
+        let least = LEAST_LEFT * median(&mut left.clone());
+        weights = left.iter().map(|l| l.max(least).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+    }
+    told.iter().all(|v| v.is_finite()).then_some(told).filter(|[gain, _]| *gain != 0.0)
+}
+
+/// How far the angle may have drifted from what is expected in the step into a row, where that is a gap: as fast as it does in a part of the
+/// run.
+fn drifts_in_gaps(theta: &[f64], expected: &[f64], t_s: &[f64]) -> impl Fn(usize) -> f64 {
+    let steps: Vec<f64> = t_s.windows(2).map(|t| t[1] - t[0]).collect();
+    let usual = median(&mut steps.clone());
+    let width = (theta.len() / PARTS).max(1);
+    let rate = |at: usize| {
+        let passed = t_s[at + width] - t_s[at];
+        let has_no_gap = passed < GAP * width as f64 * usual;
+        let off = (theta[at + width] - theta[at]) - (expected[at + width] - expected[at]);
+        (has_no_gap && passed > 0.0).then(|| (off / passed).abs())
+    };
+    let mut rates: Vec<f64> = (0..theta.len().saturating_sub(width)).step_by(width).filter_map(rate).collect();
+    rates.sort_by(f64::total_cmp);
+    // a jump is in few
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the parts")]
+    let fast = rates.get((MOST_PARTS * rates.len() as f64) as usize).copied().unwrap_or(0.0);
+    move |at| if steps[at - 1] > GAP * usual { FASTER * fast * steps[at - 1] } else { 0.0 }
 }
 
 /// By how much the steps about row `at` differ from each other, apart from the one into it.

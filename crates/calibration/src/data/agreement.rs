@@ -2,7 +2,7 @@
 //! each half of it, compared.
 //!
 //! The angular gain of a device does not depend on the run. What may differ beside the noise of a run is its bias: a drift
-//! of the pattern, which a gain takes for its own at a steady rate.
+//! of the pattern, which a gain takes for its own at a steady rate, and what slows a pattern that swings.
 
 use crate::numerics::statistics::median;
 
@@ -35,6 +35,11 @@ impl Gain {
         let by_readout = LEFT * left.min(LARGEST_LEFT * period) / range.max(f64::MIN_POSITIVE);
         let by_drift = (DRIFT_RAD_S + drift) / speed.max(f64::MIN_POSITIVE);
         Self { value, within: SHARE * value.abs() + by_drift + by_readout }
+    }
+
+    /// The gain where what the mechanics pull may have slowed the pattern by this share of it.
+    pub(crate) fn slowed_by(self, share: f64) -> Self {
+        Self { within: self.within + share * self.value.abs(), ..self }
     }
 
     pub(crate) fn agrees(&self, other: &Self) -> bool {

@@ -90,7 +90,7 @@ fn as_a_circle(x: &[f64], y: &[f64]) -> Option<[Vec<f64>; 2]> {
 }
 
 /// The smallest distance between different values of a channel, of some of its rows: of a converter, its resolution.
-fn resolution(v: &[f64]) -> f64 {
+pub(crate) fn resolution(v: &[f64]) -> f64 {
     let mut some: Vec<f64> = v.iter().copied().step_by((v.len() / ENOUGH).max(1)).collect();
     some.sort_by(f64::total_cmp);
     some.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min)

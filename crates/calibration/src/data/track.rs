@@ -10,12 +10,13 @@ use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope};
 use rayon::prelude::*;
 
 use crate::data::agreement::LARGEST_SPLIT_RAD_S;
+use crate::data::interpolated::resolution;
 use crate::data::table;
 use crate::error::Refusal;
 use crate::model::prediction::Commands;
 use crate::numerics::angles::unwrapped;
 use crate::numerics::interpolation;
-use crate::numerics::statistics::span;
+use crate::numerics::statistics::{root_mean_square, span};
 use crate::recording::{Role, Run};
 
 /// A rotation run, ready for a fit.
@@ -339,6 +340,17 @@ impl Track {
     /// Quadrature channels were recorded.
     pub(crate) fn has_quadrature(&self) -> bool {
         matches!(self.source, Source::Channels { quadrature: Some(_), .. })
+    }
+
+    /// The step of what the quadrature was read with, V, where all of it stays within one.
+    pub(crate) fn unresolved_quadrature(&self) -> Option<f64> {
+        let Source::Channels { quadrature: Some(read), .. } = &self.dense().source else { return None };
+        let step = read.iter().map(|v| resolution(v)).fold(f64::INFINITY, f64::min);
+        let scatter = |v: &Vec<f64>| {
+            let mean = v.iter().sum::<f64>() / v.len() as f64;
+            root_mean_square(&v.iter().map(|v| v - mean).collect::<Vec<_>>())
+        };
+        read.iter().all(|v| scatter(v) < step).then_some(step).filter(|step| step.is_finite())
     }
 
     /// The loops' commands and the quadrature that they leave were recorded: all that precesses the pattern.

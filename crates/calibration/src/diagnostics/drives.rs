@@ -37,7 +37,8 @@ const MUCH_MORE: f64 = 2.0;
 /// What a level has to gain in 2 ln likelihood after its price, and the share of the mean square that it may leave.
 const LEAST_GAIN: f64 = 12.0;
 const LARGEST_SHARE: f64 = 0.95;
-/// A level that gains as much in 2 ln likelihood is likely enough to be allowed for: one in 100 by chance.
+/// A level that gains as much in 2 ln likelihood, after the price of those that were tried, is likely enough to be allowed for: one in 100 by
+/// chance.
 const LIKELY: f64 = 6.6;
 /// Fewest pairs with a command beyond the level.
 const FEWEST_BEYOND: usize = 20;
@@ -251,9 +252,10 @@ pub(crate) fn clipping(dataset: &Dataset, hypothesis: &Hypothesis) -> Option<Cli
     let (x, before) = balance.best(largest)?;
     let after = balance.left(x);
     let by_chance = n * (before / after).ln();
-    let gain = by_chance - n.ln() - 2.0 * ((TRIED + REFINED) as f64).ln();
+    let tried = 2.0 * ((TRIED + REFINED) as f64).ln();
+    let gain = by_chance - n.ln() - tried;
     let count = balance.pairs.iter().filter(|p| size(&p.around[1].volts) * x > 1.0).count();
-    if by_chance < LIKELY {
+    if by_chance - tried < LIKELY {
         return None;
     }
     let is_told = gain > LEAST_GAIN && after < LARGEST_SHARE * before && count >= FEWEST_BEYOND;

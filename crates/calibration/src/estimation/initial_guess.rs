@@ -8,12 +8,18 @@ use crate::data::agreement::Gain;
 use crate::data::track::{Segment, Track};
 use crate::error::Refusal;
 use crate::estimation::propagation::Start;
+use crate::estimation::swing::{Swing, pull, swing_of};
 use crate::model::hypothesis::Hypothesis;
 use crate::numerics::angles::wrapped;
 use crate::numerics::statistics::{circular_mean, line, median, robust_deviation};
+use crate::recording::Role;
 
-/// Steps between neighbours that a first estimate needs no more of.
+/// Samples, or steps between neighbours, that a first estimate needs no more of.
 const ENOUGH: usize = 20_000;
+
+/// A fit finds what pulls the pattern by itself where the end of a run is off by less without it, rad: engineering choice, a twentieth of
+/// the pattern's period.
+const LARGEST_BEHIND: f64 = 0.16;
 
 /// The motion of a track under a hypothesis: its angular gain, and where its segments start.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +30,8 @@ pub(crate) struct Motion {
     pub(crate) deviation: f64,
     /// pattern angle covered, rad
     pub(crate) travel: f64,
+    /// how the angle swings about the line
+    pub(crate) swing: Swing,
     /// what the halves of the segments tell of the angular gain, where they are long enough to tell
     pub(crate) halves: Vec<Gain>,
 }
@@ -123,7 +131,7 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
             recent[n % MEMORY] = value;
             rest.push(value);
         }
-        let (slope, _) = robust_line(&turned, &rest);
+        let (slope, ..) = robust_line(&turned, &rest);
         halves.extend(gains_of_halves(&turned, &rest, guess, (hypothesis, track.speed_and_drift())));
         let weight: f64 = turned.iter().map(|a| a * a).sum();
         gains.push((guess + sense * slope, weight));
@@ -132,12 +140,14 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
     let weight: f64 = gains.iter().map(|g| g.1).sum();
     let gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight.max(f64::MIN_POSITIVE);
     let mut off = Vec::new();
+    let mut steady = Vec::new();
     let starts = followed
         .iter()
         .map(|(turned, rest)| {
             let after: Vec<f64> = turned.iter().zip(rest).map(|(a, r)| r - sense * (gain - guess) * a).collect();
             let angle = circular_mean(after.iter().copied(), hypothesis.period_rad);
             off.extend(after.iter().map(|r| wrapped(r - angle, hypothesis.period_rad)));
+            steady.extend(turned.iter().map(|a| angle + sense * gain * a));
             Start { angle, ..Start::default() }
         })
         .zip(&track.segments)
@@ -149,11 +159,31 @@ fn follow(track: &Track, hypothesis: &Hypothesis, bearings: &[Vec<f64>], guess: 
         .flat_map(|s| s.range.clone())
         .map(|i| gain * track.input_rad[i])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    Motion { angular_gain: gain, starts, deviation: robust_deviation(off.into_iter()), travel: hi - lo, halves }
+    let every = (off.len() / ENOUGH).max(1);
+    let swing = Swing::of(steady.into_iter().zip(off.iter().copied()).step_by(every));
+    Motion { angular_gain: gain, starts, deviation: robust_deviation(off.into_iter()), travel: hi - lo, swing, halves }
 }
 
-/// A line, fitted once more without its outliers: slope, and what is left, robustly.
-fn robust_line(x: &[f64], y: &[f64]) -> (f64, f64) {
+/// What pulls the pattern, where it slows a run by so much that the run's end would be lost without it.
+pub(crate) fn pulled(moving: &[(Track, Motion)], sense: f64) -> Option<[f64; 2]> {
+    let one_way = moving.iter().filter_map(|(t, m)| Some((sense * m.angular_gain * t.one_way_rate()?, m)));
+    let pulls = pull(&one_way.clone().map(|(precession, m)| (precession, m.swing)).collect::<Vec<_>>())?;
+    let mut behind = one_way.map(|(precession, m)| swing_of(pulls, precession).slowing() * m.travel);
+    behind.any(|by| by > LARGEST_BEHIND).then_some(pulls)
+}
+
+/// The angular gain of all runs, the farther they turn the more they count, with what pulls the pattern.
+pub(crate) fn common_gain(moving: &[(Track, Motion)], pulls: Option<[f64; 2]>, sense: f64) -> f64 {
+    let (sum, weight) = moving.iter().fold((0.0, 0.0), |(sum, all), (track, m)| {
+        let slowing = |p| swing_of(p, sense * m.angular_gain * track.mean_rate()).slowing();
+        let weight = m.travel.powi(2) * track.samples(Role::Fit) as f64;
+        (sum + weight * m.angular_gain * (1.0 + pulls.map_or(0.0, slowing)), all + weight)
+    });
+    sum / weight
+}
+
+/// A line, fitted once more without its outliers: slope, intercept, and what is left, robustly.
+fn robust_line(x: &[f64], y: &[f64]) -> (f64, f64, f64) {
     let (mut slope, mut intercept) = line(x, y);
     let mut left = 0.0;
     for _ in 0..3 {
@@ -164,7 +194,7 @@ fn robust_line(x: &[f64], y: &[f64]) -> (f64, f64) {
             x.iter().zip(y).filter(|p| off(*p).abs() < limit).map(|(a, r)| (*a, *r)).unzip();
         (slope, intercept) = line(&x, &y);
     }
-    (slope, left)
+    (slope, intercept, left)
 }
 
 /// What either half of a segment tells of the angular gain, where it covers a turn of the pattern.
@@ -181,9 +211,15 @@ fn gains_of_halves(
         .filter_map(|part| {
             let (x, y) = (&turned[part.clone()], &rest[part]);
             let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-            let (slope, left) = robust_line(x, y);
+            let (slope, intercept, left) = robust_line(x, y);
             let gain = guess + hypothesis.sense() * slope;
-            (gain.abs() * (high - low) > 2.0 * period).then(|| Gain::new(gain, left, period, high - low, motion))
+            let every = (x.len() / ENOUGH).max(1);
+            let off = || {
+                let some = x.iter().zip(y).step_by(every);
+                some.map(|(a, r)| (hypothesis.sense() * gain * a, r - intercept - slope * a))
+            };
+            let told = || Gain::new(gain, left, period, high - low, motion).slowed_by(Swing::of(off()).slowing());
+            (gain.abs() * (high - low) > 2.0 * period).then(told)
         })
         .collect()
 }

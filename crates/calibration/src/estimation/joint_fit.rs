@@ -9,7 +9,7 @@ use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown};
 use crate::estimation::amplitude_equation::energy_balance;
 use crate::estimation::fit::{Effort, Fit, Noise, Prepared, Prior, fit};
-use crate::estimation::initial_guess::Motion;
+use crate::estimation::initial_guess::{Motion, common_gain, pulled};
 use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
@@ -114,17 +114,18 @@ impl Dataset {
         let sound = screen.mended(rotations, &mut warnings)?;
         let tracks = screen.tracks(sound, period_rad, &mut warnings)?;
         let mut start = Hypothesis::ideal(instrument, period_rad, campaign.angular_gain.unwrap_or(0.8));
-        let mut prepared = Vec::new();
-        let mut gains = Vec::new();
-        for (track, motion) in screen.motions(tracks, &start, &mut warnings)? {
-            gains.push((motion.angular_gain, motion.travel.powi(2) * track.samples(Role::Fit) as f64));
-            prepared.push(prepared_run(track, motion, instrument));
+        let moving = screen.motions(tracks, &start, &mut warnings)?;
+        let pulls = (instrument == Instrument::Gyroscope).then(|| pulled(&moving, start.sense())).flatten();
+        if let Some(pulls) = pulls {
+            let member = start.admit(EffectId::Anisodamping, Origin::Declared);
+            (0..2).for_each(|p| start.set(Unknown::Effect(member, p), pulls[p]));
         }
+        start.angular_gain = common_gain(&moving, pulls, start.sense());
+        let mut prepared: Vec<Prepared> =
+            moving.into_iter().map(|(track, motion)| prepared_run(track, motion, instrument)).collect();
         if prepared.iter().all(|p| p.track.samples(Role::Fit) == 0) {
             return Err(Refusal::new("campaign", "no rotation run is left to fit", "a run with use = \"fit\""));
         }
-        let weight: f64 = gains.iter().map(|g| g.1).sum();
-        start.angular_gain = gains.iter().map(|g| g.0 * g.1).sum::<f64>() / weight;
         // Which way a sensor counts is a matter of its wiring: the campaign's own sign is kept.
         let stated = campaign.angular_gain.unwrap_or(start.angular_gain);
         if instrument == Instrument::Sensor && stated * start.angular_gain < 0.0 {

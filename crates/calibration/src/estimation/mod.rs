@@ -22,3 +22,6 @@ pub(crate) mod ring_down_agreement;
 pub(crate) mod screening;
 pub(crate) mod subsets;
 pub(crate) mod sums;
+pub(crate) mod swing;
+pub(crate) mod unknown_drives;
+pub(crate) mod unseen_quadrature;

@@ -375,6 +375,7 @@ fn run_gain(track: &Track, motion: &Motion, period: f64) -> RunGain {
         .map(|i| track.input_rad[i])
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let all = Gain::new(motion.angular_gain, motion.deviation, period, high - low, track.speed_and_drift());
+    let all = all.slowed_by(motion.swing.slowing());
     RunGain { run: track.name.clone(), all, parts: motion.halves.clone() }
 }
 

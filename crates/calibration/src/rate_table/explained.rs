@@ -5,11 +5,11 @@ use cvg_model::effects::EffectId;
 use crate::diagnostics::drives::{Clipping, clipping};
 use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
-use crate::estimation::fit::Fit;
+use crate::estimation::fit::{Fit, Prior};
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::identified::Options;
-use crate::model::hypothesis::{Hypothesis, Origin};
+use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Role;
 use crate::selection::discovery::discover;
 use crate::selection::step::Accepted;
@@ -91,7 +91,8 @@ impl Explained {
         Ok(self)
     }
 
-    /// Begun anew with the level at which the drives clip; this, where the runs refute it.
+    /// Begun anew with the level at which the drives clip; this, where the runs refute it: they leave more with it, or move it to where
+    /// nobody believes it.
     fn with_drives_that_clip(
         self,
         dataset: &mut Dataset,
@@ -105,7 +106,11 @@ impl Explained {
         let member = clipped.admit(EffectId::DriveSaturation, Origin::Declared);
         clipped.members[member].values[0] = level.inverse_level.value;
         let anew = Self::from(dataset, &clipped, options)?;
-        if anew.left(dataset) <= WORSE * self.left(dataset) {
+        let hypothesis = &anew.fitted.fit.hypothesis;
+        let is_the_level = |p: &Prior| matches!(p.unknown, Unknown::Effect(at, _) if hypothesis.members[at].id == EffectId::DriveSaturation);
+        let priors = dataset.priors(hypothesis, anew.fitted.drive.as_ref());
+        let moved_away = priors.iter().any(|p| is_the_level(p) && p.is_exceeded(hypothesis));
+        if !moved_away && anew.left(dataset) <= WORSE * self.left(dataset) {
             return Ok(anew);
         }
         dataset.clipping = None;

@@ -11,6 +11,8 @@ use crate::error::Refusal;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted};
+use crate::estimation::unknown_drives::said_of_the_damping;
+use crate::estimation::unseen_quadrature::said_of_the_quadrature;
 use crate::identified::Identification;
 use crate::model::hypothesis::{Member, Origin};
 use crate::numerics::statistics::span;
@@ -76,6 +78,8 @@ impl Found {
         let angular_gain = inference.angular_gain(&mut warnings);
         warnings.extend(inference.said_of_the_unbelieved());
         warnings.extend(inference.cubics_that_may_differ());
+        warnings.extend(said_of_the_damping(dataset, fitted));
+        warnings.extend(said_of_the_quadrature(dataset, fitted));
         let plots = with_plots.then(|| {
             let members = &fitted.fit.hypothesis.members;
             let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();
