@@ -7,7 +7,7 @@
 
 use crate::data::slips::slips;
 use crate::data::table::{integrated, turned};
-use crate::numerics::angles::unwrapped;
+use crate::numerics::angles::unwrapped_beside;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{median, span};
 use crate::recording::Run;
@@ -22,6 +22,8 @@ const LATE: f64 = 1.05;
 /// below which none is weighed more.
 const ROUNDS: usize = 20;
 const LEAST_LEFT: f64 = 0.1;
+/// A bias leaves this share at most of what is left without one: engineering choice.
+const CLEARLY_LESS: f64 = 0.8;
 /// A step that takes so many times the usual interval is a gap, in which an angle may drift twice as fast as in nine of ten parts of a run.
 const GAP: f64 = 1.5;
 const MOST_PARTS: f64 = 0.9;
@@ -33,12 +35,14 @@ const BESIDE: usize = 12;
 pub(super) fn without_jumps(run: &mut Run, period: f64) -> Vec<String> {
     let Ok(settled) = run.settled() else { return Vec::new() };
     let r = &mut run.recording;
-    let Some(theta) = r.theta_deg.as_ref().map(|v| radians(&v[settled.clone()], period)) else { return Vec::new() };
     let reference = match (&r.table_deg, &r.rate_dps) {
-        (Some(table), _) => turned(&table[settled.clone()]),
+        (Some(table), _) => turned(&table[settled.clone()], &r.t_s[settled.clone()]),
         (None, Some(rate)) => integrated(&r.t_s[settled.clone()], &rate[settled.clone()]),
         (None, None) => return Vec::new(),
     };
+    let Some(theta) = r.theta_deg.as_ref() else { return Vec::new() };
+    let theta: Vec<f64> = theta[settled.clone()].iter().map(|d| d.to_radians()).collect();
+    let theta = unwrapped_beside(&theta, &reference, period);
     let t_s = r.t_s[settled.clone()].to_vec();
     let Some([gain, bias]) = gain_and_bias(&theta, &reference, &t_s) else { return Vec::new() };
     let expected: Vec<f64> = reference.iter().zip(&t_s).map(|(a, t)| gain * a + bias * (t - t_s[0])).collect();
@@ -83,31 +87,54 @@ struct Jump {
     by: f64,
 }
 
-fn radians(degrees: &[f64], period: f64) -> Vec<f64> {
-    unwrapped(degrees.iter().map(|d| d.to_radians()), period)
-}
-
-/// How far the angle goes with the reference, and its bias, rad/s: what leaves the least of the increments over parts of the run, each
-/// counted by its size and not its square, since a jump is in few.
+/// How far the angle goes with the reference, and its bias, rad/s: with a bias where that leaves clearly less of nine in ten increments over
+/// parts of the run. A jump is in few of them, of the angle or of the reference, which a bias in a gap is not.
 fn gain_and_bias(theta: &[f64], reference: &[f64], t_s: &[f64]) -> Option<[f64; 2]> {
     let width = (theta.len() / PARTS).max(1);
     let increments = |v: &[f64]| (width..v.len()).map(|i| v[i] - v[i - width]).collect::<Vec<f64>>();
-    let (theta, reference, t_s) = (increments(theta), increments(reference), increments(t_s));
-    let rows = || theta.iter().zip(&reference).zip(&t_s);
+    let all = [theta, reference, t_s].map(increments);
+    let left = |told: &[f64; 2]| {
+        let mut off = left_of(&all, told);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the parts")]
+        let most = (MOST_PARTS * off.len() as f64) as usize;
+        *off.select_nth_unstable_by(most, f64::total_cmp).1
+    };
+    let usable = |told: &[f64; 2]| told.iter().all(|v| v.is_finite()) && told[0] != 0.0;
+    // at an even rate a bias is a part of the gain
+    let without = of_the_median(&all).filter(usable);
+    let with = by_least_absolute_sum(&all).filter(usable);
+    with.filter(|w| without.is_none_or(|other| left(w) < CLEARLY_LESS * left(&other))).or(without)
+}
+
+/// By how much each increment of the angle is off that of the reference and of the time.
+fn left_of([theta, reference, t_s]: &[Vec<f64>; 3], [gain, bias]: &[f64; 2]) -> Vec<f64> {
+    theta.iter().zip(reference).zip(t_s).map(|((t, a), dt)| (t - gain * a - bias * dt).abs()).collect()
+}
+
+/// The median of how far the angle goes with the reference where that moves.
+fn of_the_median([theta, reference, _]: &[Vec<f64>; 3]) -> Option<[f64; 2]> {
+    let usual = median(&mut reference.iter().map(|d| d.abs()).collect::<Vec<_>>());
+    let moves = theta.iter().zip(reference).filter(|(_, d)| d.abs() >= usual && **d != 0.0);
+    let mut ratios: Vec<f64> = moves.map(|(t, d)| t / d).collect();
+    (!ratios.is_empty()).then(|| [median(&mut ratios), 0.0])
+}
+
+/// What leaves the least absolute sum of the increments.
+fn by_least_absolute_sum(all: &[Vec<f64>; 3]) -> Option<[f64; 2]> {
+    let [theta, reference, t_s] = all;
     let mut told = [0.0; 2];
     let mut weights = vec![1.0; theta.len()];
     for _ in 0..ROUNDS {
         let mut equations = NormalEquations::new(2);
-        for (((t, a), dt), weight) in rows().zip(&weights) {
+        for (((t, a), dt), weight) in theta.iter().zip(reference).zip(t_s).zip(&weights) {
             equations.add(&[weight * a, weight * dt], weight * t);
         }
         told = equations.solve().try_into().ok()?;
-        let off = |((t, a), dt): ((&f64, &f64), &f64)| (t - told[0] * a - told[1] * dt).abs();
-        let left: Vec<f64> = rows().map(off).collect();
+        let left = left_of(all, &told);
         let least = LEAST_LEFT * median(&mut left.clone());
         weights = left.iter().map(|l| l.max(least).max(f64::MIN_POSITIVE).sqrt().recip()).collect();
     }
-    told.iter().all(|v| v.is_finite()).then_some(told).filter(|[gain, _]| *gain != 0.0)
+    Some(told)
 }
 
 /// How far the angle may have drifted from what is expected in the step into a row, where that is a gap: as fast as it does in a part of the

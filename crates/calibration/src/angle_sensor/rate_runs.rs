@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::samples::{Reading, SensorRun};
 use crate::error::Refusal;
-use crate::numerics::angles::unwrapped;
+use crate::numerics::angles::unwrapped_beside;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{line, median, robust_deviation, span};
 use crate::report::gate::unit;
@@ -105,7 +105,7 @@ fn angle(run: &SensorRun) -> Option<&[f64]> {
 
 /// The angle, followed through its period.
 fn followed(run: &SensorRun, period: f64) -> Option<Vec<f64>> {
-    Some(unwrapped(angle(run)?.iter().copied(), period))
+    Some(unwrapped_beside(angle(run)?, &run.reference_rad, period))
 }
 
 fn steps(run: &SensorRun) -> Option<Vec<f64>> {

@@ -56,7 +56,7 @@ impl SensorRun {
         let r = run.recording;
         let t_s = r.t_s[settled.clone()].to_vec();
         let (reference_rad, measured) = match (&r.table_deg, &r.rate_dps) {
-            (Some(table), _) => (turned(&table[settled.clone()]), true),
+            (Some(table), _) => (turned(&table[settled.clone()], &r.t_s[settled.clone()]), true),
             (None, Some(rate)) => {
                 let rate = &rate[settled.clone()];
                 (integrated(&t_s, rate), rate.iter().any(|w| *w != rate[0]))

@@ -270,7 +270,7 @@ fn input(run: &Run, rows: Range<usize>) -> (Input, bool) {
     let r = &run.recording;
     let t_s = &r.t_s[rows.clone()];
     if let Some(table) = &r.table_deg {
-        let angles = turned(&table[rows]);
+        let angles = turned(&table[rows], t_s);
         let (rate, begin) = line(t_s, &angles);
         let left: Vec<f64> = t_s.iter().zip(&angles).map(|(t, a)| a - begin - rate * t).collect();
         let rms = (left.iter().map(|v| v * v).sum::<f64>() / left.len().max(1) as f64).sqrt();

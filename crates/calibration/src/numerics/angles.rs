@@ -16,6 +16,25 @@ pub(crate) fn unwrapped(angles: impl Iterator<Item = f64>, period: f64) -> Vec<f
     out
 }
 
+/// The same beside another angle that goes as far: where that takes a step of more than a quarter of the period, as in a gap, each step is the
+/// nearest to its own.
+pub(crate) fn unwrapped_beside(angles: &[f64], other: &[f64], period: f64) -> Vec<f64> {
+    let step = |v: &[f64], i: usize| v[i] - v[i - 1];
+    let is_long = |i: usize| step(other, i).abs() > 0.25 * period;
+    let together = |i: usize| wrapped(step(angles, i), period) * step(other, i);
+    let sense = (1..angles.len()).filter(|i| !is_long(*i)).map(together).sum::<f64>().signum();
+    let mut out: Vec<f64> = Vec::with_capacity(angles.len());
+    for (i, raw) in angles.iter().enumerate() {
+        let expected = match out.last() {
+            Some(last) if is_long(i) => last + sense * step(other, i),
+            Some(last) => *last,
+            None => *raw,
+        };
+        out.push(expected + wrapped(raw - expected, period));
+    }
+    out
+}
+
 /// A phase off nothing, or off half a turn, by no more than rounding is that.
 const ROUNDING: f64 = 1e-12;
 
@@ -49,6 +68,18 @@ mod tests {
             #[allow(clippy::cast_precision_loss, reason = "a hundred")]
             let expected = i as f64 * 0.7;
             assert!((a - expected).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn beside_another_angle_a_long_step_is_the_nearest_to_its_own() {
+        let other = [0.0, 0.3, 0.6, 5.5, 5.8, -7.0];
+        for sense in [1.0, -1.0] {
+            let turned: Vec<f64> = other.iter().map(|a| sense * 1.01 * a).collect();
+            let read: Vec<f64> = turned.iter().map(|a| a.rem_euclid(TAU)).collect();
+            let followed = unwrapped_beside(&read, &other, TAU);
+            let off = followed.iter().zip(&turned).map(|(is, was)| is - was - (followed[0] - turned[0]));
+            assert!(off.into_iter().all(|off| off.abs() < 1e-12), "{followed:?}");
         }
     }
 }
