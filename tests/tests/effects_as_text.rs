@@ -45,6 +45,21 @@ scale = 1e-2
 theta_rate = "spring_cos * sin(6 * theta) + spring_sin * cos(6 * theta)"
 "#;
 
+/// Unequal gains, which the library has.
+const GAIN: &str = r#"
+id = "my-gain"
+stage = "readout"
+
+[[parameter]]
+name = "ratio"
+unit = "1"
+neutral = 1.0
+scale = 1e-2
+
+[map]
+"y'" = "y * ratio"
+"#;
+
 fn admitted(text: &str) -> EffectId {
     EffectText::parse(text, "my-effect.toml").unwrap().effect("my-effect.toml").unwrap()
 }
@@ -104,6 +119,13 @@ fn an_effect_as_text_that_is_not_there_changes_nothing() {
     assert_eq!(found(&with, Origin::Discovered), ["detection-cubic"], "{:#?}", with.steps);
     assert_eq!(with.calibration.to_text(), without.calibration.to_text());
     assert_eq!(with.report.heldout, without.report.heldout);
+    // one that says what a declared effect says made its interval four hundred times as wide
+    let again = identified(&folder, vec![admitted(GAIN)]);
+    for with in [with, again] {
+        assert_eq!(with.report.angular_gain, without.report.angular_gain);
+        assert_eq!(with.report.detection_gain_ratio, without.report.detection_gain_ratio);
+        assert_eq!(with.report.actuation_gain_ratio, without.report.actuation_gain_ratio);
+    }
 }
 
 #[test]

@@ -200,6 +200,28 @@ fn what_is_damaged_is_refused() {
     }
 }
 
+/// Ratios were 7 to 54 half widths off, and nothing was said: the command is taken for exact.
+#[test]
+fn a_command_of_another_size_than_is_stated_is_said_and_widens() {
+    for seed in [704, 705] {
+        let device = Device { noise: 1e-5, ..Device::random(seed) };
+        let sound = recorded(&device, seed, Bench::Hand, 1);
+        let of = |by: f64| {
+            let virtual_dps = sound.virtual_dps.as_ref().map(|v| v.iter().map(|v| v * by).collect());
+            told(campaign(Recording { virtual_dps, ..sound.clone() })).unwrap().report
+        };
+        let said = |r: &Survey| r.warnings.iter().any(|w| w.contains("a command is of another size"));
+        assert!(!said(&of(1.0)), "{seed}");
+        let off = of(0.95);
+        assert!(said(&off), "{seed}: {:?}", off.warnings);
+        let truths = [device.ratio, device.force.0 / device.force.1];
+        for (told, truth) in [off.detection_gain_ratio, off.actuation_gain_ratio].into_iter().zip(truths) {
+            let told = told.unwrap();
+            assert!((told.value - truth).abs() < 3.0 * told.half_width(), "{seed}: {told:?} {truth}");
+        }
+    }
+}
+
 #[test]
 fn a_gap_and_lost_cells_cost_their_rows_and_no_more() {
     let device = Device::random(705);

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use cvg_calibration::calibration::Calibration;
 use cvg_calibration::recording::read_text;
+use cvg_model::effects::{EffectId, Shown};
 use serde_json::{Value, json};
 
 use crate::report::numbers::{interval, significant, with_half_width};
@@ -159,8 +160,24 @@ impl Pair {
     fn difference(&self) -> Option<f64> {
         let [a, b] = &self.of;
         let d = b.as_ref()?.value - a.as_ref()?.value;
-        // a phase goes round
-        Some(if self.unit == "deg" { d - 360.0 * (d / 360.0).round() } else { d })
+        let round = self.goes_round();
+        Some(if round.is_finite() { d - round * (d / round).round() } else { d })
+    }
+
+    /// After how much a parameter is the same again, in its unit: a phase after a turn, an axis after half of one, all else never.
+    fn goes_round(&self) -> f64 {
+        if self.unit != "deg" {
+            return f64::INFINITY;
+        }
+        let shown = |(id, name): (&str, &str)| {
+            let effect = EffectId::ALL.iter().find(|effect| effect.description().id == id)?;
+            let division = |shown: &Shown| match shown {
+                Shown::Polar { angle, division, .. } if *angle == name => Some(*division),
+                _ => None,
+            };
+            effect.description().shown.iter().find_map(division)
+        };
+        360.0 / self.name.split_once('.').and_then(shown).unwrap_or(1.0)
     }
 
     /// Half width of the difference's interval: that of either value towards the other, in quadrature.
@@ -233,4 +250,20 @@ fn in_words(pairs: &[Pair]) -> String {
         names => writeln!(s, "moved beyond the combined 95 % intervals: {}", names.join(", ")),
     };
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_axis_goes_round_after_half_a_turn_and_a_phase_after_a_whole_one() {
+        let moved = |name: &str, [a, b]: [f64; 2]| {
+            let of = |value| Some(Parameter { name: name.into(), unit: "deg".into(), value, ci95: None });
+            Pair { name: name.into(), unit: "deg".into(), of: [of(a), of(b)] }.difference().unwrap_or(f64::NAN)
+        };
+        assert!((moved("anisodamping.theta_tau", [89.9, -89.9]) - 0.2).abs() < 1e-9);
+        assert!((moved("spring-cubic.phase", [179.9, -179.9]) - 0.2).abs() < 1e-9);
+        assert!((moved("spring-cubic.phase", [89.9, -89.9]) + 179.8).abs() < 1e-9);
+    }
 }

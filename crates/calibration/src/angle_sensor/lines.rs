@@ -40,6 +40,8 @@ const OFF_THE_GRID: f64 = 0.05;
 /// A line slower than the sensor's period, as the eccentricity of many pole pairs makes, has to come round again: within one
 /// turn it is no more than a drift.
 const TURNS_OF_A_SLOW_LINE: f64 = 1.75;
+/// A line of so many times as many per turn is no rival of one that is seen: engineering choice.
+const FAR_MORE: u32 = 64;
 
 /// The strongest line of what a table leaves, if it is no accident, and after it those of which it may be the alias because
 /// stations stand at uneven distances. Lines go up to that which the spacing of stations resolves, and that one is included:
@@ -112,9 +114,10 @@ fn folded(n: u32, reference: &[f64]) -> impl Iterator<Item = u32> {
 }
 
 /// A line that looks like one of `n` per turn on the stations that were fitted, and is another where the angle is asked for: stations at
-/// even distances do not tell the two, and what is fitted of the one says nothing of the other's stations.
+/// even distances do not tell the two, and what is fitted of the one says nothing of the other's stations. One of far more per turn is
+/// none: a shaft off its middle is far likelier than a gear of as many teeth as there are stations, less one.
 pub(crate) fn alias_elsewhere(n: u32, fitted: &[f64], asked: &[f64]) -> Option<u32> {
-    folded(n, fitted).find(|m| {
+    folded(n, fitted).filter(|m| *m < FAR_MORE * n).find(|m| {
         let [here, there] = [fitted, asked].map(|reference| beats(n, *m, reference));
         let over_both = |k: usize| (here[k][0] + there[k][0]).hypot(here[k][1] + there[k][1]) / 2.0;
         (0..2).any(|k| here[k][0].hypot(here[k][1]) > SAME && over_both(k) < ANOTHER)
@@ -245,6 +248,8 @@ mod tests {
         // 22 and 50 per turn are one on 72 stations, and each other's opposite half a step further
         assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(2.5)), Some(50));
         assert_eq!(alias_elsewhere(50, &stations(0.0), &stations(2.5)), Some(22));
+        // 71 per turn
+        assert_eq!(alias_elsewhere(1, &stations(0.0), &stations(2.5)), None);
         assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(0.0)), None);
         // a full step of the motor further it is the same again
         assert_eq!(alias_elsewhere(22, &stations(0.0), &stations(25.0)), None);

@@ -13,6 +13,8 @@ use crate::recording::Recording;
 const ON_THE_CHORD: f64 = 0.1;
 /// A sagitta tells where it is this many times the resolution of a channel: below, a coarse converter draws chords as well.
 const RESOLVED: f64 = 4.0;
+/// A row stands between its neighbours in time by this share of their distance; beside a gap it does not.
+const EVEN: std::ops::RangeInclusive<f64> = 0.2..=0.8;
 /// More rows than this share lie on no chord by chance: white noise as large as the sagitta puts one in 300 there.
 const BY_CHANCE: f64 = 0.05;
 /// … and in a short recording more than so many.
@@ -59,10 +61,12 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
         let off = |v: &[f64]| v[i] - v[i - 1] - share * (v[i + 1] - v[i - 1]);
         let chord = (x[i + 1] - x[i - 1]).hypot(y[i + 1] - y[i - 1]);
         let amplitude = f64::max(x[i - 1].hypot(y[i - 1]), x[i + 1].hypot(y[i + 1]));
+        // what was drawn stands evenly; across a gap nothing was
+        let is_even = EVEN.contains(&share);
         // a channel that stands still is another fault
         let both_move = x[i] != x[i - 1] && y[i] != y[i - 1];
         let sagitta = chord * chord / (8.0 * amplitude);
-        if both_move && sagitta > rounding {
+        if is_even && both_move && sagitta > rounding {
             judged += 1;
             drawn[i] = off(x).hypot(off(y)) < rounding.min(ON_THE_CHORD * sagitta);
         }

@@ -6,11 +6,10 @@
 //! tells it from another angular gain.
 
 use cvg_model::effects::EffectId;
-use nalgebra::DMatrix;
 
 use crate::data::track::Track;
 use crate::estimation::joint_fit::{Dataset, Fitted, fitted_tracks};
-use crate::model::hypothesis::Unknown;
+use crate::facts::Estimate;
 
 /// δk/k of a quadrature that was not recorded, one standard deviation: as of a split of 0.1 Hz beside a loop of 5 Hz.
 const UNRECORDED: f64 = 1e-3;
@@ -30,12 +29,10 @@ fn share(dataset: &Dataset, fitted: &Fitted) -> f64 {
     fitted_tracks(&dataset.tracks).filter_map(of).reduce(f64::min).unwrap_or(0.0)
 }
 
-/// The covariance of a fit with what a quadrature that was not read may have made of the angular gain.
-pub(crate) fn with_unseen_quadrature(dataset: &Dataset, fitted: &Fitted, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
-    if let Some(i) = fitted.fit.unknowns.iter().position(|u| *u == Unknown::AngularGain) {
-        covariance[(i, i)] += (fitted.fit.hypothesis.angular_gain * share(dataset, fitted)).powi(2);
-    }
-    covariance
+/// The angular gain with an interval that also holds what a quadrature that was not read may have made of it.
+pub(crate) fn with_unseen_quadrature(gain: Estimate, dataset: &Dataset, fitted: &Fitted) -> Estimate {
+    let by = 1.96 * share(dataset, fitted) * gain.value.abs();
+    gain.widened(gain.half_width().hypot(by) - gain.half_width())
 }
 
 /// What has to be said of a quadrature that was recorded and not resolved.

@@ -130,7 +130,7 @@ pub(crate) fn verdict(fitted: &Fit, data: Data<'_>, progress: &dyn Fn(&str)) -> 
     Err(Refusal::no_answer(
         &data.runs[worst].name,
         problem,
-        "decays of one resonator, each whole, with the signs and scales of the channels as in the others",
+        "decays of one resonator, each whole, with the signs and scales of the channels as in the others, and rate_dps of each that was turned",
     ))
 }
 

@@ -39,13 +39,15 @@ pub(crate) struct Errors {
 
 /// Standard errors of a root mean square by which one that is larger is so by no chance.
 const NO_CHANCE: f64 = 3.0;
+/// More than this share is no chance, however long what is left remembers: one slow wave of it would excuse anything.
+const MOST_BY_CHANCE: f64 = 0.1;
 
 impl Errors {
     /// What was found leaves a larger held-out error than that, and by no chance.
     pub(crate) fn worse_than(&self, other: &Evaluation) -> bool {
         let count = self.held_out();
         let remembered = inflation(&autocorrelation(&self.after, WHITENESS_LAGS), count);
-        let by_chance = NO_CHANCE * (remembered / (2.0 * count.max(1) as f64)).sqrt();
+        let by_chance = (NO_CHANCE * (remembered / (2.0 * count.max(1) as f64)).sqrt()).min(MOST_BY_CHANCE);
         self.after.size().rms_deg > other.size().rms_deg * (1.0 + by_chance)
     }
 

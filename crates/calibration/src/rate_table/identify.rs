@@ -7,7 +7,6 @@ use crate::diagnostics::scale_factor::scale_factor_of;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, declared_hypothesis};
 use crate::estimation::unknown_drives::with_unknown_drives;
-use crate::estimation::unseen_quadrature::with_unseen_quadrature;
 use crate::identified::{Identification, Options};
 use crate::rate_table::errors::Errors;
 use crate::rate_table::explained::{Explained, explained};
@@ -50,7 +49,6 @@ pub(crate) fn identify(
     }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let with_hidden = with_unknown_drives(&dataset, &fitted, with_hidden);
-    let with_hidden = with_unseen_quadrature(&dataset, &fitted, with_hidden);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);

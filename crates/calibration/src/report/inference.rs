@@ -13,6 +13,7 @@ use crate::estimation::identifiability::{confounded_with, separated_by};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::residuals::Window;
 use crate::estimation::ring_down_agreement::spread_of_dampings;
+use crate::estimation::unseen_quadrature::with_unseen_quadrature;
 use crate::model::hypothesis::{Hypothesis, Member, Origin, Unknown};
 use crate::recording::{Instrument, Role};
 use crate::report::polar::polar;
@@ -153,7 +154,8 @@ impl Inference<'_> {
         let open = slowed + self.dataset.screen.references_apart;
         let estimate = estimate.widened(open * estimate.value.abs() + self.beyond_belief(Unknown::AngularGain));
         let estimate = covering(estimate, "angular gain", self.own_angular_gains(), UNBELIEVED, warnings);
-        self.turned_back_once(estimate, warnings)
+        let estimate = self.turned_back_once(estimate, warnings);
+        with_unseen_quadrature(estimate, self.dataset, self.fitted)
     }
 
     /// The parameters that the fit moved beyond belief, each with the centre and the deviation of that.

@@ -28,11 +28,13 @@ pub(crate) fn with_what_was_not_found(
     fitted: &Fitted,
     covariance: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let missing = match dataset.instrument {
+    let mut missing = match dataset.instrument {
         Instrument::Sensor => return covariance.clone(),
         _ if dataset.tracks_differ() => causes(dataset, &fitted.fit.hypothesis, fitted),
         _ => askew(&fitted.fit.hypothesis),
     };
+    // without an effect that a user wrote down the answer is the one that it is without the text
+    missing.retain(|candidate| !dataset.written.contains(&candidate.id));
     dataset.balance_damping(&fitted.fit.hypothesis);
     let Some(models) = Models::around(dataset, fitted, &missing) else { return covariance.clone() };
     models.others.iter().filter_map(|other| models.moved_by(other)).fold(covariance.clone(), |all, by| all + by)
