@@ -75,14 +75,23 @@ fn law(identified: &Identification, n: Option<f64>) -> &Law {
 
 /// Checks what is proposed: what it follows, its order, its stage, and the exponents of rate and amplitude.
 fn is_proposed(identified: &Identification, follows: &str, n: Option<f64>, stage: &str, exponents: [Option<f64>; 2]) {
+    is_proposed_within(1.0, identified, (follows, n, stage), exponents);
+}
+
+/// The same, with exponents within so many half widths of what is expected.
+fn is_proposed_within(
+    half_widths: f64,
+    identified: &Identification,
+    (follows, n, stage): (&str, Option<f64>, &str),
+    exponents: [Option<f64>; 2],
+) {
     let law = law(identified, n);
     assert_eq!((law.follows.as_str(), law.stage.as_str()), (follows, stage), "{law:#?}");
     for (told, expected) in [law.rate, law.amplitude].into_iter().zip(exponents) {
         let Some(expected) = expected else { continue };
         let [low, high] = told.unwrap_or_else(|| panic!("{law:#?}"));
-        // an interval of 95 % misses one in twenty, and one half wider three in a thousand
         let off = (expected - 0.5 * (low + high)).abs();
-        assert!(off <= 1.5 * 0.5 * (high - low), "{expected} is far from {low} to {high}: {law:#?}");
+        assert!(off <= half_widths * 0.5 * (high - low), "{expected} is far from {low} to {high}: {law:#?}");
     }
 }
 
@@ -202,7 +211,8 @@ fn a_phase_that_depends_on_the_direction_is_not_taken_for_a_skew() {
     let identified = with_error(plain_paper(), |s| SIZE * (2.0 * s.theta + 0.5 + 0.6 * s.rate_rad_s.signum()).cos());
     is_left_unexplained(&identified, "rate-dependent", Some(2));
     is_corrected(&identified);
-    is_proposed(&identified, "pattern", Some(2.0), "readout", [Some(0.0), Some(0.0)]);
+    // −0.0051 ± 0.0048: of all exponents here the one that an interval of 95 % misses
+    is_proposed_within(1.5, &identified, ("pattern", Some(2.0), "readout"), [Some(0.0), Some(0.0)]);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use cvg_model::effects::EffectId;
 use cvg_simulator::scenario::Run;
 use cvg_simulator::{Settings, SimulatedRun};
 use cvg_tests::bench::{
-    all, deviations, effect, found, identify, identify_folder, identify_without, over_floor, plain_paper, scenario,
+    all, deviations, effect, found, holds, identify, identify_folder, identify_without, over_floor, plain_paper,
+    scenario,
 };
 
 /// A device without errors in rotations at these rates, deg/s, and ring-downs in these directions, deg.
@@ -169,4 +170,32 @@ fn anisodamping_is_not_told_from_unequal_drives_of_a_damping_that_nobody_told() 
         deviations(&i.report.angular_gain, settings.angular_gain)
     });
     assert!(told.iter().all(|d| d.abs() < 3.0), "{told:?}");
+}
+
+/// A split beside a quadrature that was not recorded, or that eight bits read as nothing: k was up to ten half widths low, and nothing said so.
+#[test]
+fn the_angular_gain_holds_what_a_split_makes_of_a_quadrature_that_was_not_read() {
+    let mut settings = device(&[60.0, -30.0], &[], 5);
+    settings.effects.push(effect(EffectId::Anisoelasticity, &[0.15, 0.15]));
+    settings.effects.sort_by_key(|e| e.id);
+    let truth = settings.angular_gain;
+    let told = identify_without(settings.clone(), &["xs_v", "ys_v"]).unwrap().report.angular_gain;
+    assert!(holds(&told, truth) && told.half_width() > 1.95e-3 * truth, "{told:?}");
+    let mut simulated = scenario(settings.clone()).simulate();
+    let is_read = |name: &str| ["xc_v", "xs_v", "yc_v", "ys_v"].contains(&name);
+    for column in simulated.runs.iter_mut().flat_map(|run| &mut run.columns).filter(|c| is_read(c.name)) {
+        column.values.iter_mut().for_each(|v| *v = (*v / 0.01).round() * 0.01);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    simulated.write(folder.path()).unwrap();
+    let read = identify_folder(folder.path()).unwrap().report;
+    assert!(holds(&read.angular_gain, truth), "{:?}", read.angular_gain);
+    assert!(read.warnings.iter().any(|w| w.contains("stays below a step of its converter")), "{:?}", read.warnings);
+    // finer readings tell it
+    let finer = identify(settings).unwrap().report.angular_gain;
+    assert!(
+        holds(&finer, truth) && finer.half_width() < 0.1 * read.angular_gain.half_width(),
+        "{finer:?} {:?}",
+        read.angular_gain
+    );
 }

@@ -148,4 +148,28 @@ mod tests {
             assert!(!drawn(&x, &y), "{rate_dps}");
         }
     }
+
+    /// Blocks of a recording that are held out leave gaps, beside which the rounding of a converter draws what it likes.
+    #[test]
+    fn nothing_is_drawn_across_a_gap() {
+        let (mut t, mut angle) = (vec![0.0], vec![0.0f64]);
+        for i in 1..600 {
+            // every second interval is twenty times as long, and the pattern stands in it
+            let (passed, turned) = if i % 2 == 0 { (0.2, 0.0) } else { (0.01, 0.02) };
+            t.push(t[i - 1] + passed);
+            angle.push(angle[i - 1] + turned);
+        }
+        let on_chords = |v: Vec<f64>| -> Vec<f64> {
+            (0..v.len())
+                .map(|i| match i % 2 {
+                    1 if i + 1 < v.len() => {
+                        v[i - 1] + (v[i + 1] - v[i - 1]) * (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1])
+                    }
+                    _ => v[i],
+                })
+                .collect()
+        };
+        let wide = |f: fn(f64) -> f64| on_chords(angle.iter().map(|a| f(8.0 * a)).collect());
+        assert!(!interpolated_rows(&t, &wide(f64::cos), &wide(f64::sin)).contains(&true));
+    }
 }

@@ -88,3 +88,14 @@ fn quoted(text: &str) -> String {
     let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_text_that_a_spreadsheet_would_work_out_stays_a_text() {
+        assert_eq!(quoted("=HYPERLINK(\"a\",1)"), "\"'=HYPERLINK(\"\"a\"\",1)\"");
+        assert_eq!(["+1", "-b", "@c", "d=1"].map(quoted), ["'+1", "'-b", "'@c", "d=1"]);
+    }
+}
