@@ -119,6 +119,8 @@ fn an_effect_as_text_that_is_not_there_changes_nothing() {
     assert_eq!(found(&with, Origin::Discovered), ["detection-cubic"], "{:#?}", with.steps);
     assert_eq!(with.calibration.to_text(), without.calibration.to_text());
     assert_eq!(with.report.heldout, without.report.heldout);
+    let lost = with.report.warnings.iter().find(|w| w.contains("competed and is not in the answer")).unwrap();
+    assert!([QUINTIC, SPRING].iter().all(|text| lost.contains(admitted(text).description().id)), "{lost}");
     // one that says what a declared effect says made its interval four hundred times as wide
     let again = identified(&folder, vec![admitted(GAIN)]);
     for with in [with, again] {

@@ -1,10 +1,11 @@
 //! What a drive does where the angle, or the directions of the ring-downs, tell little of it; and single rows that were damaged.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use cvg_calibration::Origin;
+use cvg_calibration::{Identification, Origin, Refusal};
+use cvg_model::Envelope;
 use cvg_model::effects::EffectId;
 use cvg_simulator::scenario::Run;
-use cvg_simulator::{Settings, SimulatedRun};
+use cvg_simulator::{Column, Settings, SimulatedRun};
 use cvg_tests::bench::{
     all, deviations, effect, found, holds, identify, identify_folder, identify_without, over_floor, plain_paper,
     scenario,
@@ -198,4 +199,35 @@ fn the_angular_gain_holds_what_a_split_makes_of_a_quadrature_that_was_not_read()
         "{finer:?} {:?}",
         read.angular_gain
     );
+}
+
+/// [`identify`] of recordings of the angle, and of these commands.
+fn identify_angles(settings: Settings, commands: &[&str]) -> Result<Identification, Refusal> {
+    let mut simulated = scenario(settings).simulate();
+    for run in &mut simulated.runs {
+        let [x_c, x_s, y_c, y_s] = ["xc_v", "xs_v", "yc_v", "ys_v"].map(|name| run.column(name).unwrap().to_vec());
+        let angle = |i: usize| Envelope::new(x_c[i], x_s[i], y_c[i], y_s[i]).pendulum().angle().to_degrees();
+        let theta = (0..x_c.len()).map(angle).collect();
+        run.columns.retain(|c| ["t_s", "rate_dps", "table_deg"].contains(&c.name) || commands.contains(&c.name));
+        run.columns.push(Column { name: "theta_deg", values: theta });
+    }
+    let folder = tempfile::tempdir().unwrap();
+    simulated.write(folder.path()).unwrap();
+    identify_folder(folder.path())
+}
+
+/// A larger split, of which the angle alone says nothing and the command that holds the quadrature down does.
+#[test]
+fn a_large_split_that_only_its_command_shows_widens_the_angular_gain_and_is_said() {
+    let mut settings = device(&[60.0, -30.0], &[], 5);
+    settings.effects.push(effect(EffectId::Anisoelasticity, &[0.85, 0.85]));
+    settings.effects.sort_by_key(|e| e.id);
+    let truth = settings.angular_gain;
+    let said = |warnings: &[String], what: &str| warnings.iter().any(|w| w.contains(what));
+    let commanded = identify_angles(settings.clone(), &["vas_v", "vqc_v"]).unwrap().report;
+    let k = commanded.angular_gain;
+    assert!(holds(&k, truth) && k.value < 0.99 * truth, "{k:?}");
+    assert!(said(&commanded.warnings, "vqc_v shows frequencies that differ by"), "{:?}", commanded.warnings);
+    let alone = identify_angles(settings, &[]).unwrap().report;
+    assert!(said(&alone.warnings, "neither the quadrature nor its command was recorded"), "{:?}", alone.warnings);
 }

@@ -239,6 +239,29 @@ fn a_gap_and_lost_cells_cost_their_rows_and_no_more() {
     assert!((ratio - device.ratio).abs() < 2e-4, "{ratio} {}", device.ratio);
 }
 
+/// One row of a hundred lost, and time stamps that jitter by a fifth of an interval: the loops never noticed, and neither does the answer.
+#[test]
+fn rows_that_are_lost_here_and_there_and_a_clock_that_jitters_are_no_disturbance() {
+    let device = Device::random(705);
+    let whole = recorded(&device, 705, Bench::Hand, 1);
+    let interval = whole.t_s[1] - whole.t_s[0];
+    let mut jittering = whole.clone();
+    jittering.t_s.iter_mut().enumerate().for_each(|(i, t)| *t += interval * 0.2 * (i as f64 * 1.7).sin());
+    let mut lossy = whole;
+    let kept: Vec<usize> = (0..lossy.t_s.len()).filter(|i| i * 7919 % 100 != 0).collect();
+    let thin = |v: &mut Vec<f64>| *v = kept.iter().map(|&i| v[i]).collect();
+    thin(&mut lossy.t_s);
+    let columns = [&mut lossy.xc_v, &mut lossy.xs_v, &mut lossy.yc_v, &mut lossy.ys_v, &mut lossy.vas_v];
+    for column in columns.into_iter().chain([&mut lossy.vqc_v, &mut lossy.virtual_dps]) {
+        thin(column.as_mut().unwrap());
+    }
+    for damaged in [jittering, lossy] {
+        let ratio = told(campaign(damaged)).unwrap().report.detection_gain_ratio.unwrap();
+        assert!((ratio.value - device.ratio).abs() < 1.5 * ratio.half_width(), "{ratio:?} {}", device.ratio);
+        assert!(ratio.half_width() < 5e-4, "{ratio:?}");
+    }
+}
+
 /// The command line's way: simulated into files, read, identified, and another recording compensated with the outcome.
 #[test]
 fn a_simulated_bench_without_a_table_calibrates_for_the_table() {

@@ -5,6 +5,7 @@ use cvg_model::effects::EffectId;
 use crate::angle_sensor::curve::Curve;
 use crate::diagnostics::plots::PlotData;
 use crate::estimation::actuation::RingDown;
+use crate::model::hypothesis::Hypothesis;
 use crate::report::Report;
 use crate::report::calibration::Calibration;
 use crate::selection::step::Step;
@@ -70,4 +71,16 @@ pub struct BiasCurve {
 pub(crate) fn not_tried(effects: &[EffectId], why: &str) -> Option<String> {
     let ids: Vec<&str> = effects.iter().map(|e| e.description().id).collect();
     (!ids.is_empty()).then(|| format!("{} had no part in this: {why}", ids.join(", ")))
+}
+
+/// What to say of effects as text that competed and are not in the answer.
+pub(crate) fn not_taken(competing: &[EffectId], hypothesis: &Hypothesis) -> Option<String> {
+    let lost = competing.iter().filter(|id| hypothesis.member(**id).is_none());
+    let ids: Vec<&str> = lost.map(|e| e.description().id).collect();
+    (!ids.is_empty()).then(|| {
+        format!(
+            "{} competed and is not in the answer: these recordings do not ask for it, or another effect explains them as well",
+            ids.join(", ")
+        )
+    })
 }

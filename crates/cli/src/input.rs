@@ -204,7 +204,8 @@ pub(crate) fn explained(error: ReadError) -> Failure {
     }
     let ReadError::MissingColumns { present, .. } = &error else { return error.into() };
     let there = |name: &str| present.split('`').any(|p| p == name);
-    if there("xc_v") && there("yc_v") && there("t_s") {
+    let of_a_resonator = ["xs_v", "ys_v", "vas_v", "vqc_v"].iter().any(|name| there(name));
+    if there("xc_v") && there("yc_v") && there("t_s") && !of_a_resonator {
         let message = format!(
             "{error}; a sin/cos sensor needs no reference: --sensor, or instrument = \"sensor\" in a campaign.toml"
         );

@@ -27,7 +27,7 @@ use crate::data::plausibility::without_frozen_rows;
 use crate::data::slips::slips;
 use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
-use crate::identified::{Identification, Options, not_tried};
+use crate::identified::{Identification, Options, not_taken, not_tried};
 use crate::model::hypothesis::Hypothesis;
 use crate::numerics::angles::unwrapped;
 use crate::numerics::statistics::{line, median, span};
@@ -382,7 +382,7 @@ fn sensor_finding(
     texts: Vec<EffectId>,
 ) -> Result<Finding<'static>, Refusal> {
     let Asked { stated, sense, period, rates_alone } = asked;
-    let (model, mut deviations) = identified(asked, model, [runs, held], texts)?;
+    let (model, mut deviations) = identified(asked, model, [runs, held], texts.clone())?;
     if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
         thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
     }
@@ -420,6 +420,7 @@ fn sensor_finding(
         hypothesis.members.extend(thermal.members());
         hypothesis.members.sort_by_key(|m| m.id);
     }
+    warnings.extend(not_taken(&texts, &hypothesis));
     Ok(Finding {
         instrument: Instrument::Sensor,
         stated_gain: stated,

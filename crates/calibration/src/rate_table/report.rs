@@ -13,7 +13,7 @@ use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::unknown_drives::said_of_the_damping;
 use crate::estimation::unseen_quadrature::said_of_the_quadrature;
-use crate::identified::Identification;
+use crate::identified::{Identification, not_taken};
 use crate::model::hypothesis::{Member, Origin};
 use crate::numerics::statistics::span;
 use crate::rate_table::errors::{Errors, figures};
@@ -80,6 +80,7 @@ impl Found {
         warnings.extend(inference.cubics_that_may_differ());
         warnings.extend(said_of_the_damping(dataset, fitted));
         warnings.extend(said_of_the_quadrature(dataset, fitted));
+        warnings.extend(not_taken(&dataset.written, &fitted.fit.hypothesis));
         let plots = with_plots.then(|| {
             let members = &fitted.fit.hypothesis.members;
             let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();

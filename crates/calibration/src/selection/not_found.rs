@@ -11,7 +11,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::normal::Normal;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Instrument;
-use crate::selection::candidates::Candidate;
+use crate::selection::candidates::{Candidate, alike_at_one_amplitude};
 use crate::selection::together::causes;
 use crate::selection::trial::extend;
 
@@ -30,7 +30,11 @@ pub(crate) fn with_what_was_not_found(
 ) -> DMatrix<f64> {
     let mut missing = match dataset.instrument {
         Instrument::Sensor => return covariance.clone(),
-        _ if dataset.tracks_differ() => causes(dataset, &fitted.fit.hypothesis, fitted),
+        _ if dataset.tracks_differ() => {
+            let mut all = causes(dataset, &fitted.fit.hypothesis, fitted);
+            all.extend(rivals_at_one_amplitude(dataset, &fitted.fit.hypothesis));
+            all
+        }
         _ => askew(&fitted.fit.hypothesis),
     };
     // without an effect that a user wrote down the answer is the one that it is without the text
@@ -42,15 +46,40 @@ pub(crate) fn with_what_was_not_found(
 
 /// The skews that a hypothesis lacks.
 fn askew(hypothesis: &Hypothesis) -> Vec<Candidate> {
-    let lacking =
-        [EffectId::DetectionSkew, EffectId::ActuationSkew].into_iter().filter(|id| hypothesis.member(*id).is_none());
+    lacking(hypothesis, [EffectId::DetectionSkew, EffectId::ActuationSkew])
+}
+
+/// What may stand in the place of an effect that was found where all runs are at one amplitude: the same to first order, and not to second.
+fn rivals_at_one_amplitude(dataset: &Dataset, hypothesis: &Hypothesis) -> Vec<Candidate> {
+    if !dataset.alike().amplitude {
+        return Vec::new();
+    }
+    let found = hypothesis.members.iter().filter(|m| m.origin == Origin::Discovered);
+    let mut rivals: Vec<EffectId> = found.flat_map(|m| alike_at_one_amplitude(m.id)).collect();
+    rivals.sort_unstable();
+    rivals.dedup();
+    lacking(hypothesis, rivals)
+}
+
+/// The size, at this amplitude, of what was found and is this effect as well where all runs are at one amplitude.
+fn found_as(hypothesis: &Hypothesis, id: EffectId, amplitude: f64) -> Option<f64> {
+    let found = hypothesis.members.iter().find(|m| alike_at_one_amplitude(m.id).any(|rival| rival == id))?;
+    let power = i32::from(found.id.description().scaling.amplitude);
+    Some(found.values.first()?.abs() * amplitude.powi(power))
+}
+
+/// Those of these effects that a hypothesis lacks.
+fn lacking(hypothesis: &Hypothesis, of: impl IntoIterator<Item = EffectId>) -> Vec<Candidate> {
+    let lacking = of.into_iter().filter(|id| hypothesis.member(*id).is_none());
     lacking.map(|id| Candidate { id, values: id.neutral(), refine: None, tried: 1.0 }).collect()
 }
 
 /// One linearisation for the fitted model and for each that has one effect more.
 struct Models {
     equations: Normal,
-    /// unknowns of the fitted model
+    hypothesis: Hypothesis,
+    unknowns: Vec<Unknown>,
+    /// those of the fitted model
     own: Vec<usize>,
     /// those of them that are held
     held: Vec<bool>,
@@ -86,14 +115,30 @@ impl Models {
             let size = match all.members[member].id {
                 EffectId::DetectionSkew if !dataset.tracks_differ() => READOUT_ASKEW,
                 EffectId::ActuationSkew if !dataset.tracks_differ() => DRIVES_ASKEW,
-                _ => d.parameters[p].scale,
+                // in the place of what was found, it is as large
+                id => found_as(&fitted.fit.hypothesis, id, amplitude)
+                    .map_or(d.parameters[p].scale, |found| found.max(d.parameters[p].scale)),
             };
             let deviation = size * amplitude.powi(-i32::from(d.scaling.amplitude));
             priors.push(Prior { unknown, mean: d.parameters[p].neutral, deviation, considered: false });
         }
         let held = own.iter().map(|&i| Prior::considered_deviation(&priors, unknowns[i]).is_some()).collect();
         let fit = Fit { hypothesis: all, unknowns, ..fitted.fit.clone() };
-        Some(Self { equations: linearised(&dataset.tracks, &fit, &priors)?, own, held, others })
+        let equations = linearised(&dataset.tracks, &fit, &priors)?;
+        Some(Self { equations, hypothesis: fit.hypothesis, unknowns: fit.unknowns, own, held, others })
+    }
+
+    /// Unknowns of what was found in the place of these: its size is what it is if it is there, and that it may be the other is said.
+    fn found_as(&self, other: &[usize]) -> Vec<usize> {
+        let members = &self.hypothesis.members;
+        let member = |i: usize| match self.unknowns[i] {
+            Unknown::Effect(member, _) => Some(members[member].id),
+            _ => None,
+        };
+        let is_found_as = |found: EffectId| {
+            other.iter().filter_map(|&i| member(i)).any(|rival| alike_at_one_amplitude(found).any(|id| id == rival))
+        };
+        self.own.iter().copied().filter(|&i| member(i).is_some_and(is_found_as)).collect()
     }
 
     /// The step of some unknowns and its covariance.
@@ -121,8 +166,9 @@ impl Models {
         let moved = &follow * mean_square * follow.transpose();
         let mut out = DMatrix::zeros(self.own.len(), self.own.len());
         let place: Vec<usize> = (0..self.own.len()).filter(|&i| !self.held[i]).collect();
-        for (a, &i) in place.iter().enumerate() {
-            for (b, &j) in place.iter().enumerate() {
+        let moves = |i: usize| !self.found_as(other).contains(&self.own[i]);
+        for (a, &i) in place.iter().enumerate().filter(|(_, i)| moves(**i)) {
+            for (b, &j) in place.iter().enumerate().filter(|(_, j)| moves(**j)) {
                 out[(i, j)] = moved[(a, b)];
             }
         }

@@ -2,6 +2,7 @@
 //! its own, through the filter that flies (`cvg-calibrator`), so that a bench and an instrument in operation tell the same.
 
 mod identify;
+mod lost_rows;
 mod passes;
 mod report;
 mod runs;

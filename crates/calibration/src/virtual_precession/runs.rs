@@ -6,6 +6,7 @@ use std::ops::Range;
 use cvg_estimator::direction::major_axis;
 use cvg_model::{AxisForces, Envelope};
 
+use super::lost_rows::bridged;
 use crate::error::Refusal;
 use crate::numerics::angles::wrapped;
 use crate::numerics::statistics::{line, median};
@@ -34,8 +35,6 @@ pub(crate) struct VirtualRun {
     asked_rad_s: Vec<f64>,
 }
 
-/// A step of time that is longer or shorter by this factor is a gap.
-const GAP: f64 = 1.5;
 /// The longest interval, s: a cycle of the filter has two rows at least, and no more than 0.1 s.
 const LONGEST_INTERVAL_S: f64 = 0.05;
 /// Standard error of a share of the command that tells something.
@@ -90,12 +89,9 @@ impl VirtualRun {
                 y_c: vqc[i] * cos,
                 y_s: vas[i] * sin + v_qs * cos,
             };
-            let step = if i > settled.start { r.t_s[i] - r.t_s[i - 1] } else { f64::INFINITY };
-            let whole = [forces.x_c, forces.x_s, forces.y_c, forces.y_s].iter().all(|v| v.is_finite());
-            Row { seen, forces, follows: whole && step < GAP * interval_s && step * GAP > interval_s }
+            (Row { seen, forces, follows: false }, asked(i))
         };
-        let rows: Vec<Row> = settled.clone().map(row).collect();
-        let asked_rad_s: Vec<f64> = settled.map(asked).collect();
+        let (rows, asked_rad_s) = bridged(&r.t_s[settled.clone()], interval_s, settled.map(row).collect());
         let fastest = |f: f64, v: &f64| if v.is_finite() { f.max(v.abs()) } else { f };
         let fastest_rad_s = asked_rad_s.iter().fold(0.0, fastest);
         Ok(Self { held: run.role == Role::Holdout, rows, interval_s, amplitude_v, fastest_rad_s, asked_rad_s })
