@@ -44,10 +44,10 @@ const BETTER: f64 = 1.0;
 /// error to stations that were not seen, where none leaves the line's only (2.3 % by chance).
 const NO_ALIAS: f64 = 2.0;
 
-/// A mean square of the angle that is larger by no more than this factor is larger by a hair, 1 % of the rms; one of the radius
-/// below this share, half the rms, is far smaller: engineering choices.
-const A_HAIR: f64 = 1.02;
-const FAR_ROUNDER: f64 = 0.25;
+/// A mean square of the angle that is larger by no more than this factor is larger by a hair, 2.5 % of the rms; one of the radius
+/// below this share, 55 % of the rms, is far smaller: engineering choices.
+const A_HAIR: f64 = 1.05;
+const FAR_ROUNDER: f64 = 0.3;
 
 /// Standard errors that a simpler model may be worse by than the best.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -85,7 +85,8 @@ pub(crate) fn verdict(runs: &[RunGain]) -> Verdict {
             let what = format!("its angular gain is {:.5} in one part and {:.5} in another", a.value, b.value);
             odd.push((i, what));
         } else if !run.all.agrees(&common) {
-            odd.push((i, format!("its angular gain is {:.5}, that of the other runs {middle:.5}", run.all.value)));
+            let what = format!("its angular gain is {:.5}, that of the other runs {middle:.5}", run.all.value);
+            odd.push((i, what + cause(run.all.value / middle)));
         }
     }
     if odd.is_empty() || (odd.len() as f64) <= MOST_LEFT_OUT * runs.len() as f64 {
@@ -99,6 +100,22 @@ pub(crate) fn verdict(runs: &[RunGain]) -> Verdict {
         format!("the runs do not agree on the angular gain: {}", each.join(", "))
     };
     Verdict::Open { run: runs[*first].run.clone(), problem }
+}
+
+/// A ratio of gains has a cause within this share: engineering choice.
+const CAUSED: f64 = 0.02;
+
+/// What a run may have in common with one whose angular gain is this many times that of the others.
+fn cause(ratio: f64) -> &'static str {
+    const CAUSES: [(f64, &str); 6] = [
+        (-1.0, ": the rate or the table has lost its sign, or X and Y are exchanged"),
+        (57.295_78, ": its rate looks as if in rad/s, or its table in rad"),
+        (1.0 / 57.295_78, ": its angle looks as if in rad"),
+        (6.0, ": its rate looks as if in revolutions per minute"),
+        (1e-3, ": its times look as if in ms, or its rate in mdeg/s"),
+        (1e3, ": its rate looks as if in thousands of deg/s"),
+    ];
+    CAUSES.iter().find(|(of, _)| (ratio / of - 1.0).abs() < CAUSED).map_or("", |(_, what)| what)
 }
 
 #[cfg(test)]
@@ -117,6 +134,17 @@ mod tests {
         runs[17].all.value = 0.75;
         let Verdict::Out(out) = verdict(&runs) else { panic!() };
         assert!(matches!(out.as_slice(), [(17, why)] if why.contains("0.75000")), "{out:?}");
+    }
+
+    #[test]
+    fn a_run_without_its_sign_or_in_another_unit_is_told_so() {
+        for (gain, what) in
+            [(-0.78, "lost its sign"), (44.69, "rad/s"), (0.75, "0.75000, that of the other runs 0.78000")]
+        {
+            let runs: Vec<RunGain> = [0.78, 0.78, gain, 0.78].iter().map(|k| run_gain("a.csv", *k)).collect();
+            let Verdict::Out(out) = verdict(&runs) else { panic!() };
+            assert!(matches!(out.as_slice(), [(2, why)] if why.contains(what)), "{out:?}");
+        }
     }
 
     #[test]

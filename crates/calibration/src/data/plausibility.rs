@@ -302,8 +302,8 @@ const ALIKE: f64 = 3.0;
 /// Runs that have to be there for one to be the odd one.
 const FEWEST_RUNS: usize = 3;
 
-/// The same for the commands of a run whose energy command is in another unit than those of most runs: per volt of amplitude all
-/// runs of an instrument need as much of it.
+/// The same for the commands of a run whose energy command is in another unit than those of most runs, or has the other sign: per volt of
+/// amplitude all runs of an instrument need as much of it.
 pub(crate) fn without_commands_in_another_unit(runs: &mut [Run], warnings: &mut Vec<String>) {
     let levels: Vec<Option<f64>> = runs.iter().map(|run| command_per_amplitude(&run.recording)).collect();
     let mut told: Vec<f64> = levels.iter().copied().flatten().collect();
@@ -311,18 +311,22 @@ pub(crate) fn without_commands_in_another_unit(runs: &mut [Run], warnings: &mut 
         return;
     }
     let common = median(&mut told);
-    let apart = |level: f64, factor: f64| level > factor * common || level * factor < common;
+    let apart = |level: f64, factor: f64| level / common > factor || level / common * factor < 1.0;
     if told.iter().filter(|level| apart(**level, ALIKE)).count() * 3 > told.len() {
         return;
     }
     for (run, level) in runs.iter_mut().zip(levels) {
         let Some(level) = level.filter(|level| apart(*level, OTHER_UNIT)) else { continue };
+        let share = level / common;
+        if share < 0.0 && share.abs() < ALIKE.recip() {
+            continue;
+        }
+        let why = if share < 0.0 { "have lost their sign" } else { "are in another unit, or of another drive" };
         (run.recording.vas_v, run.recording.vqc_v) = (None, None);
         warnings.push(format!(
-            "{}: vas_v holds its amplitude with {:.3} times as much as in the other runs: its commands are in another unit, or of another \
-             drive, and count as not recorded; wanted: vas_v and vqc_v in V",
+            "{}: vas_v holds its amplitude with {share:.3} times as much as in the other runs: its commands {why}, and count as not recorded; \
+             wanted: vas_v and vqc_v in V, with the sign of all runs",
             run.recording.source.display(),
-            level / common
         ));
     }
 }
@@ -331,8 +335,8 @@ pub(crate) fn without_commands_in_another_unit(runs: &mut [Run], warnings: &mut 
 fn command_per_amplitude(recording: &Recording) -> Option<f64> {
     let (x, y) = (recording.xc_v.as_deref()?, recording.yc_v.as_deref()?);
     let amplitude = median(&mut x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect::<Vec<_>>());
-    let level = median(&mut recording.vas_v.as_deref()?.to_vec()).abs() / amplitude;
-    (level.is_finite() && level > 0.0).then_some(level)
+    let level = median(&mut recording.vas_v.as_deref()?.to_vec()) / amplitude;
+    (level.is_finite() && level != 0.0).then_some(level)
 }
 
 /// For how many rows each value stands, where that is the same for nearly all: changes at regular rows, and of any size. A

@@ -42,6 +42,7 @@ pub(super) fn explained(
     if dataset.gives_a_run_up() {
         found = found.with_every_run_counted(dataset, paper, options)?;
     }
+    found = found.without_a_foreign_rotation(dataset, paper, options)?;
     if dataset.without_foreign_ring_downs(&found.fitted.fit)? {
         (options.progress)("beginning anew without the ring-downs of another device");
         found = Explained::from(dataset, paper, options)?;
@@ -58,7 +59,7 @@ pub(super) fn explained(
 
 impl Explained {
     /// With what is discovered, unless fits on the way to it ended where more is left than without.
-    fn from(dataset: &mut Dataset, declared: &Hypothesis, options: &Options<'_>) -> Result<Self, Refusal> {
+    pub(super) fn from(dataset: &mut Dataset, declared: &Hypothesis, options: &Options<'_>) -> Result<Self, Refusal> {
         let fitted = fit_with_ring_downs(dataset, declared)?;
         let declared = Self { declared_fit: fitted.fit.clone(), fitted, steps: Vec::new() };
         if !options.discover {

@@ -40,12 +40,19 @@ pub(crate) fn identify(
     (options.progress)("fitting the declared model");
     let paper = declared_hypothesis(&dataset.start);
     dataset.require_driven_rotations(&paper)?;
-    let Explained { declared_fit, mut fitted, mut steps } = explained(&mut dataset, &paper, options)?;
+    let Explained { mut declared_fit, mut fitted, mut steps } = explained(&mut dataset, &paper, options)?;
     (options.progress)("weighing by what the noise remembers");
     let mut covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
     if take_back_the_refuted(&mut dataset, &mut fitted, &mut steps)? {
         (options.progress)("beginning anew without what the held-out run refutes");
         covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+        let rotations = dataset.tracks.len();
+        let found = Explained { declared_fit, fitted, steps };
+        // what the held-out run refutes may be what one rotation alone asked for
+        Explained { declared_fit, fitted, steps } = found.without_a_foreign_rotation(&mut dataset, &paper, options)?;
+        if dataset.tracks.len() < rotations {
+            covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+        }
     }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let with_hidden = with_unknown_drives(&dataset, &fitted, with_hidden);

@@ -2,6 +2,7 @@
 
 mod errors;
 mod explained;
+mod foreign;
 mod identify;
 mod report;
 

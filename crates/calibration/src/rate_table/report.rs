@@ -21,7 +21,7 @@ use crate::recording::Role;
 use crate::report::benefit::no_better;
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::channels::channels;
-use crate::report::gate::{self, Facts};
+use crate::report::gate::{self, Facts, unusual_gain};
 use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::recorded::set_aside;
@@ -77,6 +77,7 @@ impl Found {
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);
         warnings.extend(inference.said_of_the_unbelieved());
+        warnings.extend(unusual_gain(angular_gain.value, dataset.screen.stated(), dataset.instrument));
         warnings.extend(inference.cubics_that_may_differ());
         warnings.extend(said_of_the_damping(dataset, fitted));
         warnings.extend(said_of_the_quadrature(dataset, fitted));

@@ -2,13 +2,28 @@
 
 use crate::report::Heldout;
 
+/// What leaves this share of the error, and so many times the noise, explains little: another instrument was recorded than the one that
+/// was modelled. Engineering choices: an effect that no library has leaves a tenth of the error, or a hundred times its noise.
+const LEAVES_MOST: f64 = 0.5;
+const FAR_ABOVE_NOISE: f64 = 1000.0;
+
 /// Why what was found is of no use, where it is not: on `samples` held-out samples the error is larger with it than without,
-/// by more than the standard error of a root mean square.
+/// by more than the standard error of a root mean square; or it is not much smaller, and far above all noise.
 pub(crate) fn no_better(heldout: &Heldout, samples: usize) -> Option<String> {
     let raw = heldout.raw?.rms_deg;
     let rms = heldout.discovered.rms_deg;
     let by_chance = 1.0 / (2.0 * samples.max(1) as f64).sqrt();
-    (rms > raw * (1.0 + by_chance)).then(|| no_help(heldout))
+    if rms > raw * (1.0 + by_chance) {
+        return Some(no_help(heldout));
+    }
+    let times = rms / heldout.noise_floor_deg;
+    (rms > LEAVES_MOST * raw && times > FAR_ABOVE_NOISE).then(|| {
+        format!(
+            "what was found explains little: {rms:.3e}° of {raw:.3e}° are left on held-out data, {times:.0} times the noise floor; wanted: \
+             recordings of what campaign.toml says (instrument, period_deg, units, what each column is); the calibration leaves the angle as \
+             it is"
+        )
+    })
 }
 
 /// Why a calibration leaves the angle as it is.

@@ -142,6 +142,18 @@ fn angular_gain(report: &Report, facts: Facts) -> Result<(), Refusal> {
     Err(Refusal::no_answer(&report.device, problem, suggestion))
 }
 
+/// What to say of an angular gain that is possible and not usual, where none is stated.
+pub(crate) fn unusual_gain(k: f64, stated: Option<f64>, instrument: Instrument) -> Option<String> {
+    let usual = stated.is_some() || instrument == Instrument::Sensor || USUAL_GAIN.contains(&k.abs());
+    (!usual).then(|| {
+        let unit = unit(k, None).map_or(String::new(), |unit| format!("; if it is not this device's, {unit}"));
+        format!(
+            "an angular gain of {} is unusual: angular_gain in [campaign] would say that it is meant{unit}",
+            plain(k)
+        )
+    })
+}
+
 /// A number with five digits, without a power of ten where it is near one.
 fn plain(value: f64) -> String {
     if (1e-3..1e5).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.4e}") }
@@ -149,7 +161,7 @@ fn plain(value: f64) -> String {
 
 /// The unit in which rates, angles or times would have to be for a gain to be possible.
 pub(crate) fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
-    const UNITS: [(f64, &str); 7] = [
+    const UNITS: [(f64, &str); 9] = [
         (
             1.0 / 57.295_78,
             "theta_deg in deg: it looks as if in rad (theta_deg = \"…*57.29578\" in [columns], or by --map)",
@@ -166,6 +178,8 @@ pub(crate) fn unit(k: f64, stated: Option<f64>) -> Option<&'static str> {
         (1e-3, "t_s in s: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map), or rate_dps in mdeg/s"),
         (1e-6, "t_s in s: it looks as if in µs (t_s = \"…*0.000001\" in [columns], or by --map)"),
         (1.0 / 3600.0, "rate_dps in deg/s: it looks as if in deg/h"),
+        (0.1, "rate_dps in deg/s: it looks as if ten times as large (rate_dps = \"…/10\" in [columns], or by --map)"),
+        (10.0, "rate_dps in deg/s: it looks as if a tenth of it (rate_dps = \"…*10\" in [columns], or by --map)"),
     ];
     let usual = |k: f64| stated.map_or(USUAL_GAIN.contains(&k.abs()), |s| ((k / s).abs() - 1.0).abs() < 0.2);
     UNITS.iter().find(|(factor, _)| usual(k / factor)).map(|(_, what)| *what)

@@ -327,6 +327,7 @@ impl Inference<'_> {
             .map(|u| self.estimate(u))
             .or_else(|| self.fitted.drive.as_ref().map(|d| Estimate::new(d.ratio(), d.ratio() * d.ratio_error)))
             .map(|e| self.with_the_readouts_share(e, detection))
+            .map(|e| self.covering_the_rotations(e, warnings))
             .filter(|e| e.half_width() < WIDEST_ACTUATION_RATIO);
         match (&identified, &self.fitted.drive) {
             (None, _) => warnings.push(
@@ -360,6 +361,23 @@ impl Inference<'_> {
             }
         }
         identified
+    }
+
+    /// An actuation gain ratio with an interval that also covers what the rotations make of it, where that is not what the ring-downs are
+    /// believed to say.
+    fn covering_the_rotations(&self, ratio: Estimate, warnings: &mut Vec<String>) -> Estimate {
+        let unknown = self.first(EffectId::ActuationGainMismatch);
+        let all = self.unbelieved();
+        let Some(prior) = all.iter().find(|prior| Some(prior.unknown) == unknown) else { return ratio };
+        let by_rotations = self.hypothesis().get(prior.unknown);
+        let names: Vec<&str> = self.fitted.ring_downs.iter().map(|r| r.name.as_str()).collect();
+        warnings.push(format!(
+            "the rotations give an actuation gain ratio of {by_rotations:.4}, the ring-downs {:.4}: is one of {} of another device, or its \
+             command in another unit? The interval covers both",
+            prior.mean,
+            names.join(", ")
+        ));
+        reaching(ratio, &[("the rotations", by_rotations), ("the ring-downs", prior.mean)])
     }
 
     /// An actuation gain ratio with an interval that also covers what the readout's unknowns make of the ring-downs: the drive

@@ -6,6 +6,7 @@ use crate::diagnostics::residual::{WHITENESS_LAGS, autocorrelation, inflation};
 use crate::estimation::fit::Fit;
 use crate::estimation::joint_fit::Dataset;
 use crate::estimation::residuals::{Residual, Window, residuals};
+use crate::numerics::statistics::{median, white_noise};
 use crate::recording::Role;
 use crate::report::{Estimate, RunReport};
 
@@ -46,6 +47,27 @@ impl Slope {
     }
 }
 
+/// What is left of a run, rms, beyond that of the usual one, and beyond its own white noise, from which on it is odd; and runs that
+/// tell what is usual. Engineering choices.
+const FAR_MORE: f64 = 5.0;
+const FEWEST_RUNS: usize = 3;
+
+/// What is left of a run, and how much of it is white, rad.
+struct Left {
+    run: usize,
+    rms: f64,
+    white: f64,
+}
+
+impl Left {
+    /// The runs of which far more is left than of the usual one, and what is left of that.
+    fn odd(all: &[Self]) -> impl Iterator<Item = (&Self, f64)> {
+        let usual = median(&mut all.iter().map(|left| left.rms).collect::<Vec<_>>());
+        let is_odd = move |left: &&Self| left.rms > FAR_MORE * usual.max(left.white);
+        all.iter().filter(move |_| all.len() >= FEWEST_RUNS).filter(is_odd).map(move |left| (left, usual))
+    }
+}
+
 /// Fills in what every run that was fitted or held out tells by itself; says which of them do not agree with the rest.
 pub(crate) fn tell_apart(
     runs: &mut [RunReport],
@@ -56,7 +78,7 @@ pub(crate) fn tell_apart(
     let memory = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
     let left: [Vec<Vec<Residual>>; 2] = [Role::Fit, Role::Holdout]
         .map(|role| residuals(&dataset.tracks, &fit.hypothesis, &fit.starts, role, Window::Whole));
-    let mut warnings = Vec::new();
+    let (mut warnings, mut seen) = (Vec::new(), Vec::new());
     for (at, (run, track)) in dataset.screen.of(runs).into_iter().zip(&dataset.tracks).enumerate() {
         let fitted = !left[0][at].is_empty();
         let (residuals, evaluation) = if fitted { (&left[0][at], on_fit) } else { (&left[1][at], held_out) };
@@ -84,11 +106,23 @@ pub(crate) fn tell_apart(
         run.bias_dps = Some(Estimate::new(drift.to_degrees(), drift_deviation.to_degrees()));
         run.rms_deg = Some(rms.to_degrees());
         let gain = Gain::new(own, rms, fit.hypothesis.period_rad, of_input.range, [track.track.mean_speed(), 0.0]);
+        let white = residuals.iter().map(|r| white_noise(&r.angle)).fold(0.0, f64::max);
+        seen.push(Left { run: at, rms, white });
         let agrees = gain.agrees(&Gain { value: k, within: 0.0 });
         run.agrees = Some(agrees);
         if !agrees {
             warnings.push(format!("{}: its angular gain is {own:.5}, that of all runs {k:.5}", track.track.file));
         }
+    }
+    let mut kept = dataset.screen.of(runs);
+    for (odd, usual) in Left::odd(&seen) {
+        kept[odd.run].agrees = Some(false);
+        warnings.push(format!(
+            "{}: {:.4}° rms are left of it, and {:.4}° of the usual run: of another device, or something acted in it that acts in no other",
+            dataset.tracks[odd.run].track.file,
+            odd.rms.to_degrees(),
+            usual.to_degrees()
+        ));
     }
     for run in dataset.screen.left_out_of(runs) {
         run.agrees = Some(false);
