@@ -5,7 +5,7 @@ use cvg_calibration::{Identification, Origin};
 use cvg_model::effects::EffectId;
 use cvg_simulator::scenario::{Purpose, Run};
 use cvg_simulator::{Scenario, Settings, Simulated, SimulatedRun};
-use cvg_tests::bench::{effect, found, holds, identify_folder, over_floor, scenario};
+use cvg_tests::bench::{deviations, effect, found, holds, identify_folder, over_floor, scenario};
 
 /// The paper's device, or another of its kind.
 fn device(detection: f64) -> Settings {
@@ -45,7 +45,7 @@ fn a_rotation_of_another_device_is_left_out_by_name_and_the_rest_is_as_without_i
         assert_eq!((run.r#use.as_str(), run.agrees), ("left out", Some(false)), "{file}: {:?}", told.report.warnings);
         assert!(told.report.warnings.iter().any(|w| w.contains(file) && w.contains("of another device")));
         assert_eq!(found(&told, Origin::Discovered), ["detection-cubic"]);
-        assert!(holds(&told.report.detection_gain_ratio.unwrap(), 1.0132) && over_floor(&told) < 1.3);
+        assert!(deviations(&told.report.detection_gain_ratio.unwrap(), 1.0132).abs() < 3.5 && over_floor(&told) < 1.3);
     }
 }
 

@@ -92,6 +92,10 @@ fn reaching(all: Estimate, runs: &[(&str, f64)]) -> Estimate {
     runs.iter().fold(all, |e, (_, own)| Estimate { ci95: [e.ci95[0].min(*own), e.ci95[1].max(*own)], ..e })
 }
 
+/// What rotations say without the ring-downs lies no further beyond the common value than so many times what lies between that and the
+/// ring-downs': of the two covariances either may be off.
+const MOST_BEYOND: f64 = 2.0;
+
 /// The share by which a correction without a cause slows a nominal precession, rad/s, if it is mechanics: by ½ p²/(kΩ)² of a
 /// precession p sin nθ. An error A sin nθ of the angle is one of n A kΩ.
 fn slowing(m: &Member, nominal: f64) -> f64 {
@@ -369,7 +373,11 @@ impl Inference<'_> {
         let unknown = self.first(EffectId::ActuationGainMismatch);
         let all = self.unbelieved();
         let Some(prior) = all.iter().find(|prior| Some(prior.unknown) == unknown) else { return ratio };
-        let by_rotations = self.hypothesis().get(prior.unknown);
+        let by_both = self.hypothesis().get(prior.unknown);
+        // the value of a fit lies between what it was told and what it would be without, by their weights
+        let variance = self.index(prior.unknown).map_or(0.0, |i| self.fitted.fit.by_noise[(i, i)]);
+        let weight = 1.0 / (prior.deviation.powi(2) / variance.max(f64::MIN_POSITIVE) - 1.0);
+        let by_rotations = by_both + (by_both - prior.mean) * weight.clamp(0.0, MOST_BEYOND);
         let names: Vec<&str> = self.fitted.ring_downs.iter().map(|r| r.name.as_str()).collect();
         warnings.push(format!(
             "the rotations give an actuation gain ratio of {by_rotations:.4}, the ring-downs {:.4}: is one of {} of another device, or its \
