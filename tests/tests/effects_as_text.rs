@@ -112,6 +112,45 @@ fn a_spring_that_the_library_lacks_is_found_by_its_text() {
     assert!(over_floor(&with) <= 1.3, "{} times the noise floor is left", over_floor(&with));
 }
 
+/// θ̇ += m |cos θ|, whose 4θ is a cubic spring's and whose 2θ is an anisodamping's to the angle: the energy command has none of it to replace.
+#[test]
+fn a_bilinear_spring_in_the_mechanics_is_no_cubic_one_and_no_anisodamping() {
+    let spring = admitted(
+        "id = \"bilinear\"\nstage = \"mechanics\"\n[[parameter]]\nname = \"m\"\nunit = \"rad/s\"\nscale = 1e-2\n\
+         [map]\ntheta_rate = \"m * abs(cos(theta))\"\n",
+    );
+    let mut settings = plain_paper();
+    settings.effects.push(effect(spring, &[5e-3]));
+    let told = identified(&campaign(settings), vec![]);
+    assert!(found(&told, Origin::Discovered).is_empty(), "{:?}", told.report.effects);
+    let said = |what: &str| told.report.warnings.iter().any(|w| w.contains(what));
+    assert!(said("the energy command has to replace one of"), "{:?}", told.report.warnings);
+    let anisodamping = told.report.effects.iter().find(|e| e.id == "anisodamping");
+    // the paper's device: 0.0047 1/s
+    let [low, high] = anisodamping.map_or([0.0, 1.0], |e| e.parameters[0].ci95.unwrap());
+    assert!((low..=high).contains(&0.0047), "{anisodamping:?}");
+}
+
+/// X(1 + k|X|⁶) between the amplitudes of a campaign is a cubic and a quintic of opposite signs.
+#[test]
+fn a_septic_readout_is_not_claimed_as_a_cubic_and_a_quintic_and_a_true_pair_is() {
+    let septic = admitted(
+        "id = \"septic\"\nstage = \"readout\"\n[[parameter]]\nname = \"k\"\nunit = \"1/V^6\"\nscale = 1e-3\n\
+         [map]\n\"x'\" = \"x * (1 + k * abs(x)^6)\"\n\"y'\" = \"y * (1 + k * abs(y)^6)\"\n",
+    );
+    let with = |planted: &[(EffectId, f64)]| {
+        let mut settings = plain_paper();
+        settings.effects.extend(planted.iter().map(|(id, size)| effect(*id, &[*size])));
+        settings.effects.sort_by_key(|e| e.id);
+        identified(&campaign(settings), vec![])
+    };
+    let told = with(&[(septic, 4e-3)]);
+    assert!(found(&told, Origin::Discovered).is_empty(), "{:?}", told.report.effects);
+    assert!(over_floor(&told) < 1.5, "{}", over_floor(&told));
+    let pair = with(&[(EffectId::DetectionCubic, 5e-3), (EffectId::DetectionQuintic, 4e-3)]);
+    assert_eq!(found(&pair, Origin::Discovered), ["detection-cubic", "detection-quintic"]);
+}
+
 #[test]
 fn an_effect_as_text_that_is_not_there_changes_nothing() {
     let folder = campaign(Scenario::paper().settings().clone());

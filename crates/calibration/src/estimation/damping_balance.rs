@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::data::track::Track;
 use crate::estimation::amplitude_equation::stretches;
-use crate::estimation::fit::{BEYOND_BELIEF, Prepared, Prior, scaled_inverse};
+use crate::estimation::fit::{BEYOND_BELIEF, Fit, Prepared, Prior, scaled_inverse};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::model::unknowns::Unknowns;
@@ -18,6 +18,8 @@ use crate::recording::Instrument;
 const LEAST_SHARE: f64 = 1e-3;
 /// The readout at 2θ.
 const READOUT: [EffectId; 2] = [EffectId::DetectionGainMismatch, EffectId::DetectionSkew];
+/// An interval that covers what another witness says goes so many times as far as that: engineering choice.
+const COVERED: f64 = 1.2;
 /// Stretches that tell by their scatter how far the balance is off.
 const FEWEST_STRETCHES: usize = 8;
 
@@ -81,6 +83,34 @@ impl Dataset {
             considered: false,
         };
         told.map_or_else(Vec::new, |told| vec![prior(told, 0), prior(told, 1)])
+    }
+
+    /// The covariance of a fit whose anisodamping is also what the energy loop had to put in, where the two contradict each other: something
+    /// that goes against the rate turns the pattern at 2θ, as a spring or a drive that no effect describes.
+    pub(crate) fn with_the_other_damping(&self, fit: &Fit, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
+        let told = self.by_the_energy_loop(&fit.hypothesis);
+        if !self.contradicts_the_damping(&fit.hypothesis) {
+            return covariance;
+        }
+        let off =
+            |unknown: Unknown| told.iter().find(|p| p.unknown == unknown).map(|p| p.mean - fit.hypothesis.get(unknown));
+        let off: Vec<f64> = fit.unknowns.iter().map(|u| off(*u).unwrap_or(0.0)).collect();
+        let off = DVector::from_vec(off) * (COVERED / 1.96);
+        covariance += &off * off.transpose();
+        covariance
+    }
+
+    /// What has to be said of an anisodamping that the energy loop contradicts.
+    pub(crate) fn said_of_the_other_damping(&self, hypothesis: &Hypothesis) -> Option<String> {
+        let (told, _) = self.damping_balance.filter(|_| self.contradicts_the_damping(hypothesis))?;
+        let values = hypothesis.member(EffectId::Anisodamping)?.values;
+        Some(format!(
+            "the angle takes an anisodamping of {:.2e} 1/s, and the energy command has to replace one of {:.2e} 1/s: something else at 2θ turns the \
+             pattern against the rate, a spring or a drive that no effect describes; its interval covers both, and what is of the same law as it \
+             is not claimed",
+            values[0].hypot(values[1]),
+            told[0].hypot(told[1])
+        ))
     }
 
     /// A fit done again with the anisodamping where the energy loop has it; `None` where that does not contradict the fit.

@@ -5,7 +5,7 @@
 //! sample, with slopes; [`crate::estimation::propagation`] strings samples together.
 
 use cvg_estimator::direction::major_axis;
-use cvg_model::effects::{EffectId, Moment, Role, Stage, Values};
+use cvg_model::effects::{EffectId, Moment, Role, Search, Shown, Stage, Values};
 use cvg_model::{Envelope, Real};
 use serde::{Deserialize, Serialize};
 
@@ -155,11 +155,18 @@ impl Hypothesis {
             Role::Refined => m.refined,
             Role::Searched(_) | Role::Chosen(_) => false,
         };
+        // a constant has no sine
+        let does_nothing = |m: &Member, p: usize| {
+            let d = m.id.description();
+            let order = d.parameters.iter().position(|q| matches!(q.role, Role::Searched(Search::PatternHarmonic)));
+            order.is_some_and(|n| m.values[n] == 0.0)
+                && d.shown.iter().any(|shown| matches!(shown, Shown::Polar { sin, .. } if *sin == p))
+        };
         self.members
             .iter()
             .enumerate()
             .flat_map(|(i, m)| m.id.description().parameters.iter().enumerate().map(move |(p, d)| (i, m, p, d.role)))
-            .filter(|(_, m, _, role)| adjusted(m, *role))
+            .filter(|(_, m, p, role)| adjusted(m, *role) && !does_nothing(m, *p))
             .map(|(i, _, p, _)| Unknown::Effect(i, p))
             .collect()
     }

@@ -16,7 +16,7 @@ use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::selection::last_step::last_step;
 use crate::selection::not_found::with_what_was_not_found;
-use crate::selection::refuted::take_back_the_refuted;
+use crate::selection::refuted::{not_claimed_beside_another_damping, take_back_the_refuted};
 
 /// Identifies the instrument.
 ///
@@ -56,6 +56,8 @@ pub(crate) fn identify(
     }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let with_hidden = with_unknown_drives(&dataset, &fitted, with_hidden);
+    let with_hidden = dataset.with_the_other_damping(&fitted.fit, with_hidden);
+    not_claimed_beside_another_damping(&dataset, &mut fitted, &mut steps);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);

@@ -80,6 +80,7 @@ impl Found {
         warnings.extend(unusual_gain(angular_gain.value, dataset.screen.stated(), dataset.instrument));
         warnings.extend(inference.cubics_that_may_differ());
         warnings.extend(said_of_the_damping(dataset, fitted));
+        warnings.extend(dataset.said_of_the_other_damping(&fitted.fit.hypothesis));
         warnings.extend(said_of_the_quadrature(dataset, fitted));
         warnings.extend(not_taken(&dataset.written, &fitted.fit.hypothesis));
         let plots = with_plots.then(|| {

@@ -529,10 +529,9 @@ impl Inference<'_> {
 
     /// Variances and covariance of two parameters of a member.
     fn block(&self, at: usize, one: usize, other: usize) -> (f64, f64, f64) {
-        match (self.index(Unknown::Effect(at, one)), self.index(Unknown::Effect(at, other))) {
-            (Some(i), Some(j)) => (self.covariance[(i, i)], self.covariance[(j, j)], self.covariance[(i, j)]),
-            _ => (0.0, 0.0, 0.0),
-        }
+        let [one, other] = [one, other].map(|p| self.index(Unknown::Effect(at, p)));
+        let between = |i: Option<usize>, j: Option<usize>| i.zip(j).map_or(0.0, |at| self.covariance[at]);
+        (between(one, one), between(other, other), between(one, other))
     }
 }
 

@@ -8,8 +8,10 @@ use crate::diagnostics::residual::{
     Along, drift_power, longest, resolved_harmonics, strongest_harmonics, strongest_line,
 };
 use crate::estimation::joint_fit::Dataset;
+use crate::estimation::residuals::Residual;
 use crate::facts::Follows;
 use crate::model::hypothesis::Hypothesis;
+use crate::numerics::statistics::line;
 use crate::recording::Instrument;
 
 /// Harmonics of the pattern and of the table that are looked at.
@@ -178,6 +180,7 @@ fn proposals(
             let told = dataset.speeds_differ() || dataset.instrument == Instrument::Sensor;
             let least = LINE_OVER_DRIFT * drift_power(dense);
             let found = told.then(|| strongest_line(dense, Along::Time, least)).flatten();
+            let found = found.filter(|(hz, _)| !turns_at(dense, *hz));
             (found.map(|f| (f.0, 0.0)).into_iter().collect(), samples as f64)
         }
     }
@@ -190,6 +193,23 @@ const BROKEN_ORDER: f64 = 0.02;
 const READOUT_HARMONICS: [f64; 4] = [2.0, 4.0, 6.0, 8.0];
 /// A line in time takes this many times more out of the residual than a slow drift of every run could.
 const LINE_OVER_DRIFT: f64 = 1.5;
+
+/// Share of what the reference turns by beside a steady rate that makes a frequency one of its own: engineering choice.
+const OWN_FREQUENCY: f64 = 0.2;
+
+/// Every run is turned to and fro at this frequency: what goes with it is what follows the input, and no line in time.
+fn turns_at(evaluation: &Evaluation, hz: f64) -> bool {
+    let is_its_own = |s: &Residual| {
+        let (slope, intercept) = line(&s.t_s, &s.table);
+        let swing = || s.t_s.iter().zip(&s.table).map(|(t, a)| (t, a - intercept - slope * t));
+        let [sin, cos, square] = swing().fold([0.0; 3], |[sin, cos, square], (t, a)| {
+            let (s, c) = (std::f64::consts::TAU * hz * t).sin_cos();
+            [sin + a * s, cos + a * c, square + a * a]
+        });
+        2.0 * (sin * sin + cos * cos) > OWN_FREQUENCY * s.t_s.len() as f64 * square
+    };
+    evaluation.segments.iter().all(is_its_own)
+}
 
 /// How a harmonic may scale, as far as the fitted runs can tell.
 fn scalings(dataset: &Dataset) -> Vec<f64> {

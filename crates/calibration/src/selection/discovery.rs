@@ -19,6 +19,7 @@ use crate::selection::candidates::candidates;
 use crate::selection::consistency::{ask_every_run, in_its_place, rival_that_explains};
 use crate::selection::one_step::{Promise, promises};
 use crate::selection::pairs::best_pair;
+use crate::selection::powers::one_power_in_their_place;
 use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
@@ -69,6 +70,7 @@ pub(crate) fn discover(
     drop_weak(dataset, &mut fitted, &mut steps)?;
     look_again(dataset, &mut fitted, &mut steps)?;
     ask_every_run(dataset, &mut fitted, &mut steps)?;
+    one_power_in_their_place(dataset, &mut fitted, &mut steps)?;
     Ok((fitted, steps))
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod last_step;
 pub(crate) mod not_found;
 mod one_step;
 mod pairs;
+mod powers;
 pub(crate) mod refuted;
 pub(crate) mod step;
 mod together;

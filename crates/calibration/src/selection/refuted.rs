@@ -4,6 +4,8 @@
 //! some of them than it was without, they are of the fitted runs alone: the model stands as it did before them, and that the held-out
 //! run had a say in it is said.
 
+use cvg_model::effects::{EffectId, Stage};
+
 use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
@@ -65,4 +67,28 @@ pub(crate) fn take_back_the_refuted(
 fn held_out(dataset: &Dataset, state: &State) -> f64 {
     let held_out = evaluate(&dataset.tracks, &state.hypothesis, &state.starts, Role::Holdout, Window::Whole, None);
     held_out.mean_square().sqrt()
+}
+
+/// Takes its name from what turns the pattern against the rate, as anisodamping does, where the energy loop contradicts the anisodamping: what
+/// the angle took for that is of the same law as what was found, and none of the library has both.
+pub(crate) fn not_claimed_beside_another_damping(dataset: &Dataset, fitted: &mut Fitted, steps: &mut [Accepted]) {
+    if !dataset.contradicts_the_damping(&fitted.fit.hypothesis) {
+        return;
+    }
+    let law = EffectId::Anisodamping.description().scaling;
+    for at in 0..fitted.fit.hypothesis.members.len() {
+        let step = step_of(&fitted.fit.hypothesis, at, steps);
+        let member = &mut fitted.fit.hypothesis.members[at];
+        let d = member.id.description();
+        if member.origin == Origin::Discovered && d.stage == Stage::Mechanics && d.scaling == law {
+            member.origin = Origin::Empirical;
+            if let Some(step) = step {
+                steps[step].origin = Origin::Empirical;
+                steps[step].inconsistency = Some(
+                    "the energy command contradicts what the angle takes for anisodamping, which is of the same law"
+                        .into(),
+                );
+            }
+        }
+    }
 }
