@@ -8,6 +8,7 @@ use crate::error::Refusal;
 use crate::numerics::angles::unwrapped_beside;
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{line, median, robust_deviation, span};
+use crate::recording::Role;
 use crate::report::gate::unit;
 
 /// Share of the runs that may be left out.
@@ -16,6 +17,12 @@ const MOST_LEFT_OUT: f64 = 1.0 / 3.0;
 /// other axes that turn with it and a random walk go into a run that turns little.
 const SHARE: f64 = 0.05;
 const DEVIATIONS: f64 = 3.0;
+/// One of so many others is odd where its scale factor is off by so many times what these differ by, and by this share. Engineering choices.
+const FEWEST_ALIKE: usize = 3;
+const FAR_APART: f64 = 10.0;
+const LEAST_APART: f64 = 3e-3;
+/// Runs whose mean temperatures differ by less are at one, K.
+const ALIKE_K: f64 = 5.0;
 /// A run whose reference moves by less than this share of what that of another does, with and without its own even rate, is at rest:
 /// references wander by a hundredth of what a hand or a table turns. Engineering choice.
 const AT_REST: f64 = 0.02;
@@ -85,7 +92,11 @@ pub(super) fn believed(
             ))
         })
     };
-    let why: Vec<Option<String>> = runs.iter().zip(&gains).map(why).collect();
+    let apart = |at: usize| {
+        reversed_at_one_rate(&runs[at], rests[at], common, period).or_else(|| odd_among_alike(&runs, &gains, at))
+    };
+    let why: Vec<Option<String>> =
+        runs.iter().zip(&gains).map(why).enumerate().map(|(at, why)| why.or_else(|| apart(at))).collect();
     let odd = why.iter().flatten().count();
     if odd as f64 > MOST_LEFT_OUT * runs.len() as f64
         && let Some((run, why)) = runs.iter().zip(&why).find_map(|(run, why)| Some((run, why.as_ref()?)))
@@ -97,6 +108,50 @@ pub(super) fn believed(
         runs.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?))),
     );
     Ok(runs.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
+}
+
+/// A run at one rate, which does not tell a scale factor from a bias, that turns as far as the others, and the other way.
+fn reversed_at_one_rate(run: &SensorRun, rests: bool, common: f64, period: f64) -> Option<String> {
+    if rests || gain(run, period).is_some() {
+        return None;
+    }
+    let theta = followed(run, period)?;
+    let gone = |v: &[f64]| Some(v.last()? - v.first()?);
+    let times = gone(&theta)? / gone(&run.reference_rad)?;
+    ((times + common).abs() < SHARE * common.abs()).then(|| {
+        format!(
+            "its angle turns {times:.4} times as far as the reference, the others {common:.4} times: its rate or its reference has lost its sign"
+        )
+    })
+}
+
+/// A fitted run whose scale factor is another than those of the others, which agree far better, at rates and temperatures that are among
+/// theirs: of another gyroscope, or of another range of it.
+fn odd_among_alike(runs: &[SensorRun], gains: &[Option<[f64; 2]>], at: usize) -> Option<String> {
+    let is_fitted = |run: &SensorRun| run.role == Role::Fit;
+    let [gain, deviation] = gains[at].filter(|_| is_fitted(&runs[at]))?;
+    let others: Vec<usize> =
+        (0..runs.len()).filter(|i| *i != at && gains[*i].is_some() && is_fitted(&runs[*i])).collect();
+    if others.len() < FEWEST_ALIKE {
+        return None;
+    }
+    let told: Vec<[f64; 2]> = others.iter().filter_map(|i| gains[*i]).collect();
+    let usual = median(&mut told.iter().map(|[gain, _]| *gain).collect::<Vec<_>>());
+    let apart = told.iter().map(|[gain, deviation]| (gain - usual).abs().max(*deviation)).fold(deviation, f64::max);
+    let off = (gain - usual).abs();
+    let among = |of: &dyn Fn(&SensorRun) -> f64, margin: f64| {
+        let (low, high) = others
+            .iter()
+            .map(|i| of(&runs[*i]))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        (low - margin..=high + margin).contains(&of(&runs[at]))
+    };
+    let fastest = |run: &SensorRun| run.rate_rad_s.iter().fold(0.0, |m: f64, r| m.max(r.abs()));
+    let warm = |run: &SensorRun| run.temp_c.as_ref().map_or(0.0, |t| t.iter().sum::<f64>() / t.len().max(1) as f64);
+    let is_alike = among(&fastest, 0.1 * fastest(&runs[at])) && among(&warm, ALIKE_K);
+    (is_alike && off > FAR_APART * apart && off > LEAST_APART * usual.abs()).then(|| {
+        format!("its scale factor is {gain:.4}, and those of the others are {usual:.4} within {apart:.4}: of another gyroscope, or range")
+    })
 }
 
 fn angle(run: &SensorRun) -> Option<&[f64]> {
@@ -242,7 +297,6 @@ pub(super) fn parting(run: &SensorRun, left: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Role;
 
     /// A minute at 100 Hz of a gyroscope with this scale factor, whose rate ends at `range`, rad/s, turned there and back.
     fn run(name: &str, gain: f64, range: f64) -> SensorRun {
@@ -285,6 +339,27 @@ mod tests {
             "{warnings:?}"
         );
         assert!(told(&runs[1..]).is_err() && told(&runs[..2]).expect("alike").is_empty());
+    }
+
+    #[test]
+    fn one_of_four_with_another_scale_factor_or_without_its_sign_at_one_rate_is_named() {
+        let mut runs: Vec<SensorRun> = (0..3).map(|i| run("a", 1.02 + 1e-5 * f64::from(i), 9.0)).collect();
+        runs.push(run("odd", 0.998, 9.0));
+        let warnings = told(&runs).expect("three that agree");
+        assert!(
+            warnings.len() == 1 && warnings[0].starts_with("odd: left out: its scale factor is 0.9980"),
+            "{warnings:?}"
+        );
+        // three that differ as much tell nothing of a fourth
+        runs[1] = run("a", 1.01, 9.0);
+        assert!(told(&runs).expect("apart").is_empty());
+        let mut even = run("even", -1.02, 9.0);
+        even.reference_rad = even.t_s.iter().map(|t| 0.5 * t).collect();
+        even.rate_rad_s.fill(0.5);
+        even.reading = Reading::Angle(even.t_s.iter().map(|t| -0.51 * t).collect());
+        runs[3] = even;
+        let warnings = told(&runs).expect("three of one sign");
+        assert!(warnings.len() == 1 && warnings[0].contains("has lost its sign"), "{warnings:?}");
     }
 
     #[test]
