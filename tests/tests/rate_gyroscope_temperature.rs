@@ -97,6 +97,39 @@ fn a_bias_that_differs_from_run_to_run_is_not_taken_for_one_that_goes_with_the_t
     assert!(claimed == 0 && told >= 1, "{claimed} of 6 claimed, {told} of 3 told");
 }
 
+/// A table that goes one way in runs that warm up a little: a scale factor that goes with the temperature was taken for a bias that does.
+#[test]
+fn a_scale_factor_that_goes_with_the_temperature_is_no_bias_that_does() {
+    const SCALE_PER_K: f64 = 5e-5;
+    let made = (0..10).map(|i| {
+        let mut noise = Noise::new(700 + i);
+        let (dt, mut theta, mut angle) = (0.02, 0.0, 0.0);
+        let (mut t_s, mut table, mut read, mut temp_c) = (vec![], vec![], vec![], vec![]);
+        for n in 0..3000 {
+            let (t, share) = (f64::from(n) * dt, f64::from(n) / 3000.0);
+            let warmer_k = 20.0 * (i / 2) as f64 - 40.0 + 0.5 * share;
+            let rate = if t < 5.0 { 0.0 } else { 20.0 * (1.0 - 2.0 * (i % 2) as f64) };
+            angle += rate * dt;
+            theta += ((1.0 + SCALE_PER_K * warmer_k) * rate + BIAS_DPS) * dt + 1e-5 * noise.sample();
+            t_s.push(t);
+            table.push(angle);
+            read.push(theta);
+            temp_c.push(25.0 + warmer_k);
+        }
+        let columns = Recording { t_s, ..Recording::default() };
+        let recording = Recording { table_deg: Some(table), theta_deg: Some(read), temp_c: Some(temp_c), ..columns };
+        run(&format!("{i}.csv"), if i < 8 { Role::Fit } else { Role::Holdout }, recording)
+    });
+    let i = identified(Campaign {
+        instrument: Instrument::Gyroscope,
+        angular_gain: None,
+        temperature_c: Some(25.0),
+        ..sensor(made.collect())
+    });
+    // deg/s/K, of which 1e-4 is a drift of 0.2° in 40 s at 50 K
+    assert!(slope(&i).is_none_or(|[value, ..]| value.abs() < 1e-5), "{:?}", slope(&i));
+}
+
 #[test]
 fn compensate_undoes_it_by_the_calibration_and_asks_for_the_temperature() {
     let i = identified(campaign(4, THERE_AND_BACK, PER_K, 0.0, 3));

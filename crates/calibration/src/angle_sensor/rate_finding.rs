@@ -293,7 +293,7 @@ fn rate_effects(model: &RateGyroscope) -> Vec<EffectReport> {
                 Some(effect(EffectId::AngleLatency, "latency", "s", value, deviation))
             }
             // the scale factor is k, a run's own bias is no effect of the instrument, and one that goes with the temperature is told by itself
-            Term::Scale | Term::BiasOf(_) | Term::BiasPerKelvin | Term::Response => None,
+            Term::Scale | Term::BiasOf(_) | Term::BiasPerKelvin | Term::ScalePerKelvin | Term::Response => None,
         })
         .collect()
 }

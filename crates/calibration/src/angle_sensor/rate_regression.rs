@@ -19,6 +19,8 @@ pub(crate) enum Term {
     Scale,
     /// how the bias goes with the temperature, rad/s/K
     BiasPerKelvin,
+    /// how the scale factor goes with the temperature, 1/K
+    ScalePerKelvin,
     /// l, s
     Lag,
     /// c, s², of the acceleration a lag ago: what a response is besides late
@@ -56,6 +58,8 @@ pub(super) struct Stretch {
     acceleration: Vec<f64>,
     /// how much warmer it was for how long since the first row, K s; none where that is not asked for
     warmth: Option<Vec<f64>>,
+    /// how much warmer it was for how much of the reference's turn, K rad; none where that is not asked for
+    warm_turn: Option<Vec<f64>>,
     pub(super) error: Vec<f64>,
 }
 
@@ -72,6 +76,7 @@ impl Stretch {
             rate: mean_rates(run, lag_s),
             acceleration: ago(&run.t_s, &run.acceleration_rad_s2, lag_s),
             warmth: None,
+            warm_turn: None,
             error,
         })
     }
@@ -80,7 +85,7 @@ impl Stretch {
     #[cfg(test)]
     pub(super) fn of(t: Vec<f64>, reference: Vec<f64>, error: Vec<f64>) -> Self {
         let none = vec![0.0; t.len()];
-        Self { run: 0, t, reference, rate: none.clone(), acceleration: none, warmth: None, error }
+        Self { run: 0, t, reference, rate: none.clone(), acceleration: none, warmth: None, warm_turn: None, error }
     }
 
     /// First rows of so many parts, and the end of the last: alike in time, or, where one of them would hold most of the way that the
@@ -118,6 +123,7 @@ impl Stretch {
             rate: self.rate[rows.clone()].to_vec(),
             acceleration: self.acceleration[rows.clone()].to_vec(),
             warmth: self.warmth.as_ref().map(|warmth| warmth[rows.clone()].to_vec()),
+            warm_turn: self.warm_turn.as_ref().map(|turn| turn[rows.clone()].to_vec()),
             error: self.error[rows].to_vec(),
         }
     }
@@ -129,6 +135,7 @@ impl Stretch {
             Term::BiasOf(run) => (self.run == run).then_some(&self.t),
             Term::Scale => Some(&self.reference),
             Term::BiasPerKelvin => self.warmth.as_deref(),
+            Term::ScalePerKelvin => self.warm_turn.as_deref(),
             Term::Lag => Some(&self.rate),
             Term::Response => Some(&self.acceleration),
         }
@@ -140,8 +147,8 @@ impl Stretch {
     }
 
     /// The same beside how much warmer it was for how long, K s.
-    pub(super) fn with_warmth(self, warmth: Vec<f64>) -> Self {
-        Self { warmth: Some(warmth), ..self }
+    pub(super) fn with_warmth(self, [warmth, warm_turn]: [Vec<f64>; 2]) -> Self {
+        Self { warmth: Some(warmth), warm_turn: Some(warm_turn), ..self }
     }
 
     /// The same with another error.

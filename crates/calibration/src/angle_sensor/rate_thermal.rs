@@ -4,7 +4,7 @@
 //! $$b(T) = b + c\\,(T - T_0), \quad e = c \int (T - T_0)\\,dt$$
 //!
 //! Where the temperature changes within the runs, c is regressed on the angle error of all rows beside a bias of each run's own, so that
-//! a bias that does not repeat from run to run is not taken for it. Where each run has a temperature of its own, it is regressed
+//! a bias that does not repeat from run to run is not taken for it, and beside a scale factor that goes with the temperature itself. Where each run has a temperature of its own, it is regressed
 //! beside one bias of all runs, and what the runs tell one without the other is its interval. Either has to predict what was left out, as a lag has.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -29,6 +29,8 @@ const WITHIN: f64 = 0.5;
 const BY_CHANCE: f64 = 5e-4;
 /// Fewest such runs: beside scale factor, bias and slope one is spare.
 const FEWEST_RUNS: usize = 4;
+/// … and from which on a slope of the scale factor is told beside it.
+const RUNS_FOR_BOTH: usize = 6;
 /// A temperature that goes with the time so closely is not told from it.
 const WITH_TIME: f64 = 0.9;
 
@@ -61,7 +63,9 @@ impl BiasOverTemperature {
         }
         let reference_c = reference_c.unwrap_or(all.iter().sum::<f64>() / all.len() as f64);
         let sensor = Sensor::new(Some(stated_gain.unwrap_or(1.0)), period, runs).ok()?;
-        let warmed = |(stretch, run): (Stretch, &SensorRun)| stretch.with_warmth(warmth(run, reference_c));
+        let warmed = |(stretch, run): (Stretch, &SensorRun)| {
+            stretch.with_warmth([warmth(run, reference_c), warm_turn(run, reference_c)])
+        };
         let stretches: Vec<Stretch> = stretches(runs, &sensor, 0.0)?.into_iter().zip(runs).map(warmed).collect();
         let widest = temperatures.iter().map(|t| span(t)).fold(0.0, f64::max);
         let (slope, half_width, how) = if widest >= LEAST_SPAN_K.max(WITHIN * span(&all)) {
@@ -132,9 +136,16 @@ fn warmth(run: &SensorRun, reference_c: f64) -> Vec<f64> {
     accumulated(&run.t_s, &warmer)
 }
 
+/// Kelvin radians of the reference's turn beyond a temperature since the first row.
+fn warm_turn(run: &SensorRun, reference_c: f64) -> Vec<f64> {
+    let warmer: Vec<f64> = run.temp_c.iter().flatten().map(|t| t - reference_c).collect();
+    accumulated(&run.reference_rad, &warmer)
+}
+
 /// Slope, half width and evidence from runs that go through the temperatures.
 fn within(stretches: &[Stretch], folds: &Folds) -> Option<(f64, f64, String)> {
-    let beside: Vec<Term> = (0..stretches.len()).map(Term::BiasOf).chain([Term::Scale, Term::Lag]).collect();
+    let beside: Vec<Term> =
+        (0..stretches.len()).map(Term::BiasOf).chain([Term::Scale, Term::Lag, Term::ScalePerKelvin]).collect();
     let terms = [beside.as_slice(), &[Term::BiasPerKelvin]].concat();
     let last = terms.len() - 1;
     let left_out = |terms: &[Term]| left_out_in_turn(stretches, folds, terms).sqrt();
@@ -156,8 +167,8 @@ fn within(stretches: &[Stretch], folds: &Folds) -> Option<(f64, f64, String)> {
     let rms = |square_root: f64| (square_root / rows.sqrt()).to_degrees();
     told.then(|| {
         let evidence = format!(
-            "blocks that were left out in turn are off by {:.4}° with it and {:.4}° without, beside a bias of each run's own, scale factor \
-             and lag; interval by jackknife and as of a random walk",
+            "blocks that were left out in turn are off by {:.4}° with it and {:.4}° without, beside a bias of each run's own, a scale factor \
+             that goes with the temperature, and lag; interval by jackknife and as of a random walk",
             rms(with),
             rms(without)
         );
@@ -170,7 +181,9 @@ fn between(stretches: &[Stretch]) -> Option<(f64, f64, String)> {
     if stretches.len() < FEWEST_RUNS {
         return None;
     }
-    let beside = [Term::Bias, Term::Scale, Term::Lag];
+    let mut beside = vec![Term::Bias, Term::Scale, Term::Lag];
+    // a scale factor that goes with the temperature is told from a bias that does by runs to spare
+    beside.extend((stretches.len() >= RUNS_FOR_BOTH).then_some(Term::ScalePerKelvin));
     let terms = [beside.as_slice(), &[Term::BiasPerKelvin]].concat();
     let law = ErrorLaw::likelier(stretches, &terms);
     let without = |left_out: usize| -> Vec<Stretch> {
@@ -184,8 +197,9 @@ fn between(stretches: &[Stretch]) -> Option<(f64, f64, String)> {
         gained += left(&terms, &fit) - left(&beside, &estimate(&others, &beside, law));
         fits.push(fit);
     }
-    let (slope, deviation) = (estimate(stretches, &terms, law)[3], jackknife(&fits, terms.len())[3]);
-    let student = StudentsT::new(0.0, 1.0, (stretches.len() - 3) as f64).ok()?;
+    let last = terms.len() - 1;
+    let (slope, deviation) = (estimate(stretches, &terms, law)[last], jackknife(&fits, terms.len())[last]);
+    let student = StudentsT::new(0.0, 1.0, (stretches.len() - last) as f64).ok()?;
     let told = gained < 0.0 && slope.abs() > student.inverse_cdf(1.0 - 0.5 * BY_CHANCE) * deviation;
     told.then(|| {
         let evidence = format!(

@@ -38,7 +38,7 @@ pub(crate) fn summary(identified: &Identification) -> String {
     for Number { name, value, unit } in further(r) {
         line(format!("  {name:<27} {} {unit}", estimated(&value)));
     }
-    for (name, said) in over_temperature(r) {
+    for (name, said) in over_temperature(identified) {
         line(format!("  {name:<27} {said}"));
     }
     for w in &r.warnings {
@@ -48,16 +48,25 @@ pub(crate) fn summary(identified: &Identification) -> String {
 }
 
 /// How what runs tell goes with their temperatures, and why that is not told.
-fn over_temperature(r: &Report) -> Vec<(&'static str, String)> {
+fn over_temperature(identified: &Identification) -> Vec<(&'static str, String)> {
+    let r: &Report = &identified.report;
     let Some(t) = &r.temperature else { return Vec::new() };
+    // beside |k|, how that goes
+    let falls = is_rate_gyroscope(identified) && r.angular_gain.value < 0.0;
+    let of_the_gain = t.angular_gain_per_k.map(|e| if falls { turned(&e) } else { e });
     let slopes = [
-        ("gain over temperature", t.angular_gain_per_k, "1/K"),
+        ("gain over temperature", of_the_gain, "1/K"),
         ("bias over temperature", t.bias_dps_per_k, "deg/s/K"),
         ("gain of Y over X, over temp.", t.detection_gain_ratio_per_k, "1/K"),
     ];
     let told =
         slopes.into_iter().filter_map(|(name, slope, unit)| Some((name, format!("{} {unit}", estimated(&slope?)))));
     told.chain(t.reason.iter().map(|why| ("over temperature", why.clone()))).collect()
+}
+
+/// With the other sign.
+fn turned(e: &Estimate) -> Estimate {
+    Estimate { value: -e.value, ci95: [-e.ci95[1], -e.ci95[0]] }
 }
 
 /// The gains that an instrument of this kind has, by the names that they have there.
@@ -68,8 +77,7 @@ fn gains(identified: &Identification) -> Vec<(&'static str, String)> {
     let k = r.angular_gain;
     let sense = identified.calibration.hypothesis.sense();
     if is_rate_gyroscope(identified) {
-        let size =
-            Estimate { value: k.value.abs(), ci95: if k.value < 0.0 { [-k.ci95[1], -k.ci95[0]] } else { k.ci95 } };
+        let size = if k.value < 0.0 { turned(&k) } else { k };
         let scale = or_not(Some(k).filter(Estimate::is_told).map(|_| size));
         return vec![("scale factor |k|", format!("{scale}, counting {}", with_or_against(sense * k.value)))];
     }
