@@ -100,6 +100,33 @@ fn one_turn_without_a_reference_is_judged_all_around() {
     }
 }
 
+/// An amplifier that cuts the tops of both channels, with the converter's noise on top of it: no row repeats, so that no rail is seen, and
+/// a gain ratio of 1.034 ± 0.002 came out of equal gains.
+#[test]
+fn tops_that_an_amplifier_cuts_are_said_and_in_the_intervals() {
+    let degrees: Vec<f64> = (0..8 * ROWS).map(|i| f64::from(i) * 2.0).collect();
+    let cut = |[low, high]: [[f64; 2]; 2]| {
+        let mut draws = Noise::new(5);
+        let mut read = |signal: &dyn Fn(f64) -> f64, [low, high]: [f64; 2]| -> Vec<f64> {
+            degrees.iter().map(|d| (0.1 + signal(d.to_radians())).clamp(low, high) + 0.002 * draws.sample()).collect()
+        };
+        let (x, y) = (read(&f64::cos, low), read(&f64::sin, high));
+        alone(sensor(vec![read_at(degrees.clone(), x, y, Role::Fit)]))
+    };
+    let told = cut([[-0.85, 1.0], [-2.0, 0.9]]);
+    assert!(told.warnings.iter().any(|w| w.contains("tops that an amplifier cuts")), "{:?}", told.warnings);
+    let holds = |value: Option<[f64; 2]>, truth: f64| value.is_none_or(|[low, high]| (low..=high).contains(&truth));
+    assert!(holds(told.detection_gain_ratio.map(|e| e.ci95), 1.0), "{:?}", told.detection_gain_ratio);
+    let offsets = told.effects.iter().filter(|e| e.id == "detection-offset").flat_map(|e| &e.parameters);
+    offsets.for_each(|p| assert!(holds(p.ci95, 0.1), "{p:?}"));
+    // most of the radius is left
+    let worse = cut([[-0.7, 0.7], [-0.7, 0.7]]);
+    assert_eq!(worse.status, Status::Neutral, "{:?}", worse.radius);
+    assert!(worse.reason.unwrap().contains("explains little of the radius"));
+    let whole = cut([[-2.0, 2.0], [-2.0, 2.0]]);
+    assert!(whole.status == Status::Answered && !whole.warnings.iter().any(|w| w.contains("amplifier")));
+}
+
 /// Whole counts and a hundred rows: five of them at the peak and one beside it are no converter's rail.
 #[test]
 fn a_circle_in_whole_counts_has_no_rail() {

@@ -45,6 +45,15 @@ const LARGEST_LEFT: f64 = 0.25;
 const PARTS: usize = 8;
 const LEAST_CHANGE: f64 = 5e-3;
 
+/// Directions in which the rows of a turn stand, and rows that make one.
+const DIRECTIONS: usize = 72;
+const FEWEST_IN_A_DIRECTION: usize = 3;
+/// What is left of the radius stands out of its noise by this factor, is this share of the radius at least, and is most of what there was
+/// above this share of it. Engineering choices.
+const STANDS_OUT: f64 = 3.0;
+const LEAST_LEFT: f64 = 2e-3;
+const LEAVES_MOST: f64 = 0.5;
+
 /// What two channels told without a reference.
 #[derive(Debug, Clone)]
 pub(crate) struct Told {
@@ -100,11 +109,16 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         let what = format!("the channels cover {:.0}° of a turn only", 360.0 - largest_gap_deg);
         return Err(refuse(what, "rows all around the turn, or a reference: table_deg or rate_dps"));
     }
-    let deviations = deviations(&readout, &thinned);
+    let left = Left::of(&readout, &fitted);
+    let by_noise = deviations(&readout, &thinned);
+    let by_what_is_left = left.in_the_values(LibraryReadout::from(&readout).amplitude);
+    let deviations: [f64; 6] = std::array::from_fn(|i| by_noise[i].hypot(by_what_is_left[i] / STUDENT_19));
     let plain = Readout { rails, ..Readout::plain() };
     let (before, after) = (constancy(&plain, &held), constancy(&readout, &held));
     let raw_turns = turns(&readout);
-    let neutral = readout.kind == Kind::Plain || (raw_turns && after.rms >= before.rms);
+    let explains_little = raw_turns && left.goes_with_the_direction() && after.rms > LEAVES_MOST * before.rms;
+    let neutral = readout.kind == Kind::Plain || (raw_turns && after.rms >= before.rms) || explains_little;
+    warnings.extend(left.said());
     let as_recorded =
         predicted_raw.map_or("as recorded the angle does not turn".into(), |rms| format!("{rms:.2e} as recorded"));
     let evidence = format!(
@@ -132,7 +146,10 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     calibration_stands(&calibration)?;
     Ok(Told {
         status: if neutral { Status::Neutral } else { Status::Answered },
-        reason: neutral.then(|| "nothing that was found makes the radius of held-out rows more constant".to_owned()),
+        reason: neutral.then(|| match left.said().filter(|_| explains_little) {
+            Some(said) => format!("what was found explains little of the radius: {said}"),
+            None => "nothing that was found makes the radius of held-out rows more constant".to_owned(),
+        }),
         detection_gain_ratio: told.then(|| Estimate { value: values[2], ci95: [values[2] - half, values[2] + half] }),
         effects,
         radius: Radius {
@@ -145,6 +162,67 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         warnings,
         curve: Curve::new(&readout, &held),
     })
+}
+
+/// What is left of the radius, as shares of it.
+struct Left {
+    /// that goes with the direction, rms
+    with_direction: f64,
+    /// that does not, rms
+    beside: f64,
+}
+
+impl Left {
+    /// Of rows in so many directions, those of which there are a few.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below DIRECTIONS")]
+    fn of(readout: &Readout, runs: &[SensorRun]) -> Self {
+        let mut directions: Vec<Vec<f64>> = vec![Vec::new(); DIRECTIONS];
+        for [x, y] in undone(readout, runs) {
+            let place = (y.atan2(x) / TAU).rem_euclid(1.0) * DIRECTIONS as f64;
+            directions[place as usize % DIRECTIONS].push(x.hypot(y));
+        }
+        directions.retain(|radii| radii.len() >= FEWEST_IN_A_DIRECTION);
+        let all: Vec<f64> = directions.iter().flatten().copied().collect();
+        let mean = |radii: &[f64]| radii.iter().sum::<f64>() / radii.len().max(1) as f64;
+        let usual = mean(&all);
+        let (mut between, mut within) = (0.0, 0.0);
+        for radii in &directions {
+            let middle = mean(radii);
+            between += radii.len() as f64 * (middle - usual).powi(2);
+            within += radii.iter().map(|r| (r - middle).powi(2)).sum::<f64>();
+        }
+        let [rows, kinds] = [all.len(), directions.len()].map(|n| n as f64);
+        let beside = within / (rows - kinds).max(1.0);
+        // the means scatter by the noise as well
+        let with_direction = ((between - kinds * beside) / rows.max(1.0)).max(0.0);
+        let share = |square: f64| square.sqrt() / usual.max(f64::MIN_POSITIVE);
+        Self { with_direction: share(with_direction), beside: share(beside) }
+    }
+
+    /// An error that no readout of the library undoes stands out of the noise.
+    fn goes_with_the_direction(&self) -> bool {
+        self.with_direction > LEAST_LEFT && self.with_direction > STANDS_OUT * self.beside
+    }
+
+    /// What an error of the radius of this size is in the values of a readout of this amplitude, twice its rms: it may be one of theirs as
+    /// well as none of them.
+    fn in_the_values(&self, amplitude: f64) -> [f64; 6] {
+        let share = if self.goes_with_the_direction() { 2.0 * self.with_direction } else { 0.0 };
+        let cubic = share / (amplitude * amplitude);
+        [share * amplitude, share * amplitude, share, share, cubic, cubic]
+    }
+
+    fn said(&self) -> Option<String> {
+        self.goes_with_the_direction().then(|| {
+            format!(
+                "{:.2} % of the radius are left that go with the direction, and {:.2} % of noise: tops that an amplifier cuts, a field that is no \
+                 sine, or a third error that two channels alone do not tell; intervals allow for as much; look at the channels over the angle, or \
+                 record a reference",
+                100.0 * self.with_direction,
+                100.0 * self.beside
+            )
+        })
+    }
 }
 
 /// Turns of the direction of a run's two channels over those of its reference, about the centre of what they draw; none
