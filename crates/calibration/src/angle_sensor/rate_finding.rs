@@ -9,6 +9,7 @@ use super::rate_gyroscope::{RateGyroscope, tell_scale};
 use super::rate_nonlinearity::Nonlinearity;
 use super::rate_regression::{Stretch, Term};
 use super::rate_runs;
+use super::rate_runs::require_a_scale_factor;
 use super::rate_thermal::BiasOverTemperature;
 use super::report::{ByItself, Finding};
 use super::samples::SensorRun;
@@ -70,6 +71,9 @@ pub(super) fn rate_finding(
     let (model, by_nonlinearity) = beside_nonlinearity(&applied, stated, period, runs);
     let scale_factor = by_nonlinearity.as_ref().map(Nonlinearity::found);
     let (gain, deviation) = model.gain;
+    if model.answered {
+        require_a_scale_factor(gain, stated.unwrap_or(1.0))?;
+    }
     let sign = if sense.unwrap_or(-gain).is_sign_negative() { -1.0 } else { 1.0 };
     let value = sign * gain.abs();
     let applied_gain = sign * applied.gain.0.abs();

@@ -58,7 +58,8 @@ pub(super) fn believed(
         return Err(Refusal::no_answer(
             &run.name,
             "theta_deg turns by more than half a period from row to row",
-            "t_s in seconds: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map); or rows closer together",
+            "t_s in seconds and the rate in deg/s: it looks as if in ms (t_s = \"…*0.001\" in [columns], or by --map), or in mdeg/s \
+             (theta_deg = \"integral(…/1000)\"); or rows closer together",
         ));
     }
     let rests = at_rest(&runs.iter().collect::<Vec<_>>());
@@ -70,15 +71,7 @@ pub(super) fn believed(
         0 => (scale, "that of a rate gyroscope"),
         _ => (median(&mut told), "that of the other runs"),
     };
-    if !(0.5..2.0).contains(&(common / scale).abs()) {
-        return Err(Refusal::no_answer(
-            "campaign",
-            format!(
-                "the angle turns {common:.4} times as far as the reference, and the scale factor should be near {scale}"
-            ),
-            unit(common, Some(scale)).unwrap_or("rates in deg/s, angles in deg and times in s"),
-        ));
-    }
+    require_a_scale_factor(common, scale)?;
     let why = |(run, gain): (&SensorRun, &Option<[f64; 2]>)| {
         end_of_range(run, period).or_else(|| {
             let is_odd = |[gain, deviation]: &[f64; 2]| {
@@ -108,6 +101,22 @@ pub(super) fn believed(
         runs.iter().zip(&why).filter_map(|(run, why)| Some(format!("{}: left out: {}", run.name, why.as_ref()?))),
     );
     Ok(runs.into_iter().zip(why).filter(|(_, why)| why.is_none()).map(|(run, _)| run).collect())
+}
+
+/// Says no to a scale factor that is not the nominal one in any unit that was meant.
+///
+/// # Errors
+/// Where it is less than half or more than twice that.
+pub(super) fn require_a_scale_factor(gain: f64, scale: f64) -> Result<(), Refusal> {
+    if (0.5..2.0).contains(&(gain / scale).abs()) {
+        return Ok(());
+    }
+    Err(Refusal::no_answer(
+        "campaign",
+        format!("the angle turns {gain:.4} times as far as the reference, and the scale factor should be near {scale}"),
+        unit(gain, Some(scale))
+            .unwrap_or("rates in deg/s, angles in deg and times in s: of ms or mdeg/s a thousand are one"),
+    ))
 }
 
 /// A run at one rate, which does not tell a scale factor from a bias, that turns as far as the others, and the other way.
