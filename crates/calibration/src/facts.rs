@@ -345,6 +345,9 @@ pub struct RunReport {
     pub dropped: Vec<String>,
     /// mean input rate, deg/s
     pub rate_dps: Option<f64>,
+    /// positive, negative or both: which ways the input turned; null of other kinds than a rotation
+    #[serde(default)]
+    pub way: Option<String>,
     /// samples set aside as spikes
     pub spikes: usize,
     /// decay time constant, s
@@ -406,13 +409,17 @@ pub struct Misalignment {
     pub reason: Option<String>,
 }
 
-/// How the scale factor goes with the input rate.
+/// How the scale factor goes with the input rate, and how it repeats from run to run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ScaleFactor {
-    /// angular gain at the fastest less that at the slowest rate, either sense alike, over their mean, ppm
-    pub nonlinearity_ppm: Estimate,
-    /// angular gain at positive less that at negative rates, over their mean, ppm
-    pub asymmetry_ppm: Estimate,
+    /// angular gain at the fastest less that at the slowest rate, either sense alike, over their mean, ppm; null where fewer than four
+    /// rates of both senses are there
+    pub nonlinearity_ppm: Option<Estimate>,
+    /// angular gain at positive less that at negative rates, over their mean, ppm; null where the nonlinearity is
+    pub asymmetry_ppm: Option<Estimate>,
+    /// standard deviation of what each run says of the angular gain by itself, ppm of it; null with fewer than three runs that do
+    #[serde(default)]
+    pub repeatability_ppm: Option<Estimate>,
 }
 
 /// How what runs tell goes with their temperatures: slopes of straight lines, with intervals from the scatter of the runs.
@@ -511,7 +518,7 @@ pub struct Report {
     pub decomposition: Vec<Share>,
     /// effects that are proposed for the library, each in the form of an effect file
     pub proposals: Vec<EffectText>,
-    /// how the scale factor goes with the rate; null where fewer than four rates of both senses are there
+    /// how the scale factor goes with the rate and repeats; null where the runs tell neither
     pub scale_factor: Option<ScaleFactor>,
     /// how far the input axis is off the plane across other axes; absent without a run about one
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -5,8 +5,7 @@ use super::rate_alone::{SAME_SPEED, found};
 use super::rate_gyroscope::{RateGyroscope, tell_scale};
 use super::rate_regression::{Stretch, Term};
 use super::samples::{Reading, SensorRun};
-use crate::diagnostics::gain_over_rate::GainOverRate;
-use crate::facts::ScaleFactor;
+use crate::diagnostics::gain_over_rate::{AlongTheRate, GainOverRate};
 use crate::report::Estimate;
 
 /// Blocks of a run that steps of the rate are looked for in, and rows of one.
@@ -32,7 +31,7 @@ impl Nonlinearity {
         Some(Self { over_rate, gain: model.gain.0 })
     }
 
-    pub(super) fn found(&self) -> ScaleFactor {
+    pub(super) fn found(&self) -> AlongTheRate {
         self.over_rate.found
     }
 

@@ -11,6 +11,7 @@ use super::readout::Readout;
 use super::samples::SensorRun;
 use crate::data::track::ONE_WAY;
 use crate::diagnostics::evaluate::Evaluation;
+use crate::diagnostics::gain_over_rate::AlongTheRate;
 use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::reported_harmonics;
 use crate::diagnostics::temperature::{Seen, temperature};
@@ -26,11 +27,12 @@ use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::recorded::{run_report, set_aside};
+use crate::report::repeatability::scale_factor;
 use crate::report::stages::stages;
 use crate::report::unexplained::{against_a_command, left_over, residual_report};
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport,
-    Temperature, Tool, Unexplained,
+    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, Share, Status, StepReport, Temperature, Tool,
+    Unexplained,
 };
 
 /// Errors of a run at one stage, rad.
@@ -59,7 +61,7 @@ pub(crate) struct Finding<'a> {
     pub(crate) declared: Errors<'a>,
     pub(crate) discovered: Errors<'a>,
     /// how the scale factor of a rate gyroscope goes with the rate
-    pub(crate) scale_factor: Option<ScaleFactor>,
+    pub(crate) scale_factor: Option<AlongTheRate>,
     /// the bias of all runs of a rate gyroscope, rad/s, where they share one
     pub(crate) bias: Option<Estimate>,
     /// what each run tells by itself, of what is answered
@@ -234,10 +236,10 @@ pub(crate) fn report(
         steps,
         residual,
         channels: Vec::new(),
-        runs: reported,
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
-        scale_factor: finding.scale_factor,
+        scale_factor: scale_factor(finding.scale_factor, &reported, angular_gain),
+        runs: reported,
         misalignment: Vec::new(),
         allan: None,
         temperature,

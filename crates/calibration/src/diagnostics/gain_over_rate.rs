@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use crate::facts::{Estimate, ScaleFactor};
+use crate::facts::Estimate;
 
 /// What a bias common to all runs is believed to be without data, standard deviation, deg/s: the Earth's rate.
 const BIAS_DPS: f64 = 0.004_2;
@@ -54,10 +54,19 @@ impl Law {
     }
 }
 
+/// How a gain goes with the rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AlongTheRate {
+    /// at the fastest less that at the slowest rate, either sense alike, over their mean, ppm
+    pub(crate) nonlinearity_ppm: Estimate,
+    /// at positive less that at negative rates, over their mean, ppm
+    pub(crate) asymmetry_ppm: Estimate,
+}
+
 /// Gains at several rates with a law through them.
 #[derive(Debug, Clone)]
 pub(crate) struct GainOverRate {
-    pub(crate) found: ScaleFactor,
+    pub(crate) found: AlongTheRate,
     law: Law,
     /// slowest and fastest speed, deg/s
     ends: [f64; 2],
@@ -87,7 +96,7 @@ impl GainOverRate {
     }
 
     /// The same law through other gains.
-    pub(crate) fn again(&self, gains: &[(f64, Estimate)], bias_dps: f64) -> Option<ScaleFactor> {
+    pub(crate) fn again(&self, gains: &[(f64, Estimate)], bias_dps: f64) -> Option<AlongTheRate> {
         let gains = Gains::new(gains, bias_dps)?;
         Some(gains.in_ppm(&gains.fitted(self.law.clone())?).found)
     }
@@ -176,7 +185,7 @@ impl Gains {
         let estimate =
             |i: usize, scale: f64| Estimate::new(ppm * scale * fitted.values[i], (ppm * scale * deviation(i)).abs());
         GainOverRate {
-            found: ScaleFactor { nonlinearity_ppm: estimate(last, 1.0), asymmetry_ppm: estimate(sense, 2.0) },
+            found: AlongTheRate { nonlinearity_ppm: estimate(last, 1.0), asymmetry_ppm: estimate(sense, 2.0) },
             law: fitted.law.clone(),
             ends: self.ends,
             coefficients_ppm: fitted.values.iter().skip(1).take(last).map(|c| ppm * c).collect(),
@@ -227,7 +236,7 @@ mod tests {
         (rate, Estimate { value: gain, ci95: [gain - half_width, gain + half_width] })
     }
 
-    fn scale_factor(gains: &[(f64, Estimate)]) -> Option<ScaleFactor> {
+    fn scale_factor(gains: &[(f64, Estimate)]) -> Option<AlongTheRate> {
         Some(GainOverRate::told(gains, 0.0)?.found)
     }
 

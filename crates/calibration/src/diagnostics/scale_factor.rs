@@ -3,12 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnostics::covariance::of_blocks;
-use crate::diagnostics::gain_over_rate::{GainOverRate, range_of_rates};
+use crate::diagnostics::gain_over_rate::{AlongTheRate, GainOverRate, range_of_rates};
 use crate::estimation::fit::{Effort, Fit, fit};
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Residual, Window, residuals};
-use crate::facts::{Estimate, ScaleFactor};
+use crate::facts::Estimate;
 use crate::model::hypothesis::{Hypothesis, Unknown};
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::robust_deviation;
@@ -28,7 +28,7 @@ const UNKNOWNS: usize = 5;
 /// Nonlinearity and asymmetry of the scale factor, where the runs' rates are such as tell them. What the fit leaves open of the
 /// mechanics and the readout moves the gains of slow runs by more than those of fast ones: the intervals allow for it, by the covariance of
 /// the unknowns.
-pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<ScaleFactor> {
+pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<AlongTheRate> {
     range_of_rates(dataset.tracks.iter().map(|t| t.track.mean_rate().to_degrees()))?;
     let (free, covariance) = with_drifts(dataset, fitted);
     let told = GainOverRate::told(&gains(dataset, &free.hypothesis, &free.starts), 0.0)?;
@@ -50,7 +50,7 @@ pub(crate) fn scale_factor_of(dataset: &mut Dataset, fitted: &Fitted) -> Option<
         squares[1] += (other.asymmetry_ppm.value - nominal.asymmetry_ppm.value).powi(2);
     }
     let wider = |e: Estimate, square: f64| e.widened(e.half_width().hypot(1.96 * square.sqrt()) - e.half_width());
-    Some(ScaleFactor {
+    Some(AlongTheRate {
         nonlinearity_ppm: wider(nominal.nonlinearity_ppm, squares[0]),
         asymmetry_ppm: wider(nominal.asymmetry_ppm, squares[1]),
     })

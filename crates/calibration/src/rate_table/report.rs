@@ -4,6 +4,7 @@ use cvg_model::effects::EffectId;
 use cvg_model::effects::harmonic_n::scaling::DIRECTION;
 use nalgebra::DMatrix;
 
+use crate::diagnostics::gain_over_rate::AlongTheRate;
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::PlotContext;
 use crate::diagnostics::temperature::{LEAST_SPAN_K, Seen, temperature};
@@ -25,10 +26,11 @@ use crate::report::gate::{self, Facts, unusual_gain};
 use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::recorded::set_aside;
+use crate::report::repeatability::scale_factor;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
-use crate::report::{EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool};
+use crate::report::{EffectReport, Estimate, Input, Report, RunReport, SCHEMA, Status, Temperature, Tool};
 use crate::selection::step::Step;
 
 /// What the campaign says of itself, kept while its recordings are taken apart.
@@ -51,7 +53,7 @@ pub(super) struct Found {
     /// the same with what effects that were not found may have moved
     pub(super) with_hidden: DMatrix<f64>,
     pub(super) steps: Vec<Step>,
-    pub(super) scale_factor: Option<ScaleFactor>,
+    pub(super) scale_factor: Option<AlongTheRate>,
     pub(super) errors: Errors,
     /// drives that clip, which the commands tell and the angle does not
     pub(super) drives: Option<EffectReport>,
@@ -114,10 +116,10 @@ impl Found {
             residual: residual_report(&self.errors.on_fit, &self.errors.discovered),
             channels: channels_left,
             unexplained,
-            runs,
             decomposition: shares(&self.errors.declared_on_fit, &amplitudes),
             proposals,
-            scale_factor: self.scale_factor,
+            scale_factor: scale_factor(self.scale_factor, &runs, angular_gain),
+            runs,
             misalignment: Vec::new(),
             allan: None,
             temperature,

@@ -15,7 +15,12 @@ pub(crate) struct Number<'a> {
 /// Those of a report, in the order in which they are read.
 pub(crate) fn further(r: &Report) -> Vec<Number<'_>> {
     let scale = r.scale_factor.iter().flat_map(|s| {
-        [("scale factor, nonlinearity", s.nonlinearity_ppm, "ppm"), ("scale factor, asymmetry", s.asymmetry_ppm, "ppm")]
+        let told = [
+            ("scale factor, nonlinearity", s.nonlinearity_ppm),
+            ("scale factor, asymmetry", s.asymmetry_ppm),
+            ("scale factor, repeatability", s.repeatability_ppm),
+        ];
+        told.into_iter().filter_map(|(name, value)| Some((name, value?, "ppm")))
     });
     let rest = r.allan.iter().flat_map(|a| {
         let walk = a.angle_random_walk_deg_sqrt_h.map(|e| ("angle random walk", e, "deg/√h"));
