@@ -75,6 +75,10 @@ fn scale_factor_and_bias_repeat_from_run_to_run_as_planted() {
     let [value, low, high] = estimate(&report["scale_factor"]["repeatability_ppm"]);
     assert!((value / 500.0 - 1.0).abs() < 0.1 && low < value && value < high, "{value} in {low} … {high}");
     assert!(report["runs"].as_array().unwrap().iter().all(|run| run["way"] == "both"), "{}", report["runs"]);
+    let units =
+        report["warnings"].as_array().unwrap().iter().filter(|w| w.as_str().unwrap().contains("is the integral of"));
+    let units: Vec<&Value> = units.collect();
+    assert!(units.len() == 1 && units[0].as_str().unwrap().starts_with("0.csv and 2 other files: "), "{units:?}");
     for (term, planted, unit) in
         [("scale factor, repeatability", 500.0, "ppm"), ("bias, repeatability", 906.0, "deg/h")]
     {

@@ -20,6 +20,7 @@ pub(crate) mod stages;
 pub mod survey;
 pub(crate) mod unexplained;
 pub(crate) mod way;
+pub(crate) mod worded;
 
 pub use crate::facts::*;
 
