@@ -121,6 +121,22 @@ try {
             if (!turned && over("left", "right") > 1 && over("top", "bottom") > 3) found.push(`${plot.id}: ${a.text} over ${b.text}`);
           }));
         }
+        // a number before a letter is a number of one more digit to those who read quickly
+        boxes(".xtick text").filter(({ text }) => /^\d+θ$/.test(text)).forEach(({ text }) => found.push(`${plot.id}: ${text} for a harmonic`));
+        // titles of axes
+        const titles = boxes(".xtitle, .x2title, .ytitle, .y2title");
+        const meet = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+        titles.forEach((a, i) => titles.slice(i + 1).filter((b) => meet(a.box, b.box)).forEach((b) => found.push(`${plot.id}: ${a.text} over ${b.text}`)));
+        // panels: those of axes that lie over others on purpose are the same panel
+        const own = Object.values(plot._fullLayout._plots).filter(({ yaxis: y, xaxis: x }) => !y.overlaying && !x.overlaying);
+        const panels = own.map(({ id, xaxis: x, yaxis: y }) => ({ id, left: x._offset, right: x._offset + x._length, top: y._offset, bottom: y._offset + y._length }));
+        panels.forEach((a, i) => panels.slice(i + 1).filter((b) => meet(a, b)).forEach((b) => found.push(`${plot.id}: panel ${a.id} over panel ${b.id}`)));
+        // and no room that is nobody's: the panels fill their figure, but for what is written between them
+        const gap = (p) => p.top - Math.max(...panels.filter((q) => q.bottom <= p.top).map((q) => q.bottom));
+        const between = panels.map(gap).filter(Number.isFinite);
+        const { _size: size } = plot._fullLayout;
+        const below = panels.length > 0 ? size.t + size.h - Math.max(...panels.map((p) => p.bottom)) : 0;
+        if (Math.max(below, ...between) > 150) found.push(`${plot.id}: ${Math.max(below, ...between)} px of nothing`);
         // nor over the panel beside theirs
         const { xaxis, yaxis, xaxis2, yaxis2 } = plot._fullLayout;
         if (xaxis2 && yaxis2 && !yaxis2.overlaying) {

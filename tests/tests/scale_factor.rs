@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::{Campaign, Instrument, Recording, Role, Run};
-use cvg_calibration::report::Estimate;
+use cvg_calibration::report::{Estimate, Report};
 use cvg_model::effects::EffectId;
 use cvg_simulator::scenario::Run as Simulated;
 use cvg_tests::angle_sensor::{Noise, identified, run, sensor};
@@ -24,6 +24,12 @@ fn steady(rate_dps: f64, k: f64, seed: u64) -> Run {
     run(&format!("{rate_dps}.csv"), Role::Fit, recording)
 }
 
+/// Nonlinearity and asymmetry of a report that tells both.
+fn told_of_the_scale(report: &Report) -> [Estimate; 2] {
+    let scale = report.scale_factor.unwrap();
+    [scale.nonlinearity_ppm, scale.asymmetry_ppm]
+}
+
 #[test]
 fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed_for_it() {
     for ppm in [0.0, 200.0] {
@@ -33,9 +39,9 @@ fn a_scale_factor_that_goes_with_the_rate_is_told_and_no_bias_of_a_run_is_blamed
         let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
         let report = identified(campaign).report;
         let holds = |e: Estimate, planted: f64| holds(&e, planted);
-        let scale = report.scale_factor.unwrap();
-        assert!(holds(scale.nonlinearity_ppm, ppm) && scale.nonlinearity_ppm.half_width() < 20.0, "{scale:?}");
-        assert!(holds(scale.asymmetry_ppm, 0.0), "{scale:?}");
+        let [nonlinearity_ppm, asymmetry_ppm] = told_of_the_scale(&report);
+        assert!(holds(nonlinearity_ppm, ppm) && nonlinearity_ppm.half_width() < 20.0, "{nonlinearity_ppm:?}");
+        assert!(holds(asymmetry_ppm, 0.0), "{asymmetry_ppm:?}");
         for (r, rate) in report.runs.iter().zip(rates) {
             let (bias, gain) = (r.bias_dps.unwrap(), r.angular_gain.unwrap());
             assert!(holds(bias, BIAS_DPS) && bias.half_width() < 0.01, "{ppm} ppm, {}: {bias:?}", r.file);
@@ -65,7 +71,7 @@ fn a_scale_factor_that_goes_with_the_square_of_the_rate_is_told_as_it_is() {
         for (name, runs) in [("steady", steady), ("staircase", vec![staircase(&stairs, of, seed)])] {
             let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
             let report = identified(campaign).report;
-            let told = report.scale_factor.unwrap().nonlinearity_ppm;
+            let [told, _] = told_of_the_scale(&report);
             println!("{name}, {seed}: {told:?}");
             assert!(holds(&told, planted) && told.half_width() < 0.1 * planted, "{name}, {seed}: {told:?}");
             for (r, rate) in report.runs.iter().zip(&both_ways).filter(|_| name == "steady") {
@@ -111,9 +117,9 @@ fn a_staircase_of_rates_in_one_run_tells_as_much_and_no_slip_or_lag_is_made_of_i
         let campaign = Campaign { instrument: Instrument::Gyroscope, angular_gain: None, ..sensor(runs) };
         let report = identified(campaign).report;
         let holds = |e: Estimate, planted: f64| holds(&e, planted);
-        let scale = report.scale_factor.unwrap();
-        assert!(holds(scale.nonlinearity_ppm, nonlinearity), "{scale:?}");
-        assert!(holds(scale.asymmetry_ppm, asymmetry) && scale.asymmetry_ppm.half_width() < 50.0, "{scale:?}");
+        let [nonlinearity_ppm, asymmetry_ppm] = told_of_the_scale(&report);
+        assert!(holds(nonlinearity_ppm, nonlinearity), "{nonlinearity_ppm:?}");
+        assert!(holds(asymmetry_ppm, asymmetry) && asymmetry_ppm.half_width() < 50.0, "{asymmetry_ppm:?}");
         assert!(report.effects.iter().all(|e| e.id != "angle-latency"), "{:?}", report.effects);
         assert!(report.warnings.len() == 1 && is_not_undone(&report.warnings[0]), "{:?}", report.warnings);
     }
@@ -135,8 +141,7 @@ fn what_the_fit_leaves_open_is_in_the_intervals_of_a_whole_angle_gyroscope() {
                 *rate_dps = -60.0;
             }
         }
-        let found = identify(settings).unwrap().report.scale_factor.unwrap();
-        let parts = [found.nonlinearity_ppm, found.asymmetry_ppm];
+        let parts = told_of_the_scale(&identify(settings).unwrap().report);
         println!("{seed}: {parts:?}");
         assert!(parts.iter().all(|e| e.half_width() < 200.0), "{seed}: {parts:?} says nothing");
         parts.iter().filter(|e| !holds(e, 0.0)).count()

@@ -345,6 +345,9 @@ pub struct RunReport {
     pub dropped: Vec<String>,
     /// mean input rate, deg/s
     pub rate_dps: Option<f64>,
+    /// positive, negative or both: which ways the input turned; null of other kinds than a rotation
+    #[serde(default)]
+    pub way: Option<String>,
     /// samples set aside as spikes
     pub spikes: usize,
     /// decay time constant, s
@@ -513,6 +516,9 @@ pub struct Report {
     pub proposals: Vec<EffectText>,
     /// how the scale factor goes with the rate; null where fewer than four rates of both senses are there
     pub scale_factor: Option<ScaleFactor>,
+    /// standard deviation of what each run says of the angular gain by itself, ppm of it; null with fewer than three runs that do
+    #[serde(default)]
+    pub repeatability_ppm: Option<Estimate>,
     /// how far the input axis is off the plane across other axes; absent without a run about one
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub misalignment: Vec<Misalignment>,

@@ -12,6 +12,7 @@ use crate::recording::{Campaign, Run};
 use crate::report::calibration::Calibration;
 use crate::report::recorded::run_report;
 use crate::report::survey::Survey;
+use crate::report::worded::once_a_kind;
 use crate::report::{Allan, Estimate, RunReport, provenance};
 use crate::virtual_precession;
 
@@ -47,7 +48,16 @@ struct Rest {
 ///
 /// # Errors
 /// [`Refusal`] where the campaign is not what it says it is, or does not carry an answer.
-pub fn answer(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
+pub fn answer(campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
+    let mut answer = told(campaign, options)?;
+    match &mut answer {
+        Answer::Identified(identified) => once_a_kind(&mut identified.report.warnings, &identified.report.runs),
+        Answer::Surveyed(surveyed) => once_a_kind(&mut surveyed.report.warnings, &surveyed.report.runs),
+    }
+    Ok(answer)
+}
+
+fn told(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
     if virtual_precession::serves(&campaign) {
         let mut surveyed = virtual_precession::identify(&campaign, options)?;
         surveyed

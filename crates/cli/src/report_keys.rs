@@ -52,6 +52,7 @@ const NUMBERS: &[&str] = &[
     "proposals.**",
     "scale_factor.nonlinearity_ppm~",
     "scale_factor.asymmetry_ppm~",
+    "repeatability_ppm~",
     "misalignment.*.angle_deg~",
     "allan.angle_random_walk_deg_sqrt_h~",
     "allan.angle_random_walk_tau_s",

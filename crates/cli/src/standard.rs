@@ -2,7 +2,8 @@
 //!
 //! A mapping of terms only: no clause of the standard is quoted, and none is claimed to be fulfilled.
 
-use cvg_calibration::report::{Report, RunReport};
+use cvg_calibration::report::Report;
+use cvg_calibration::report::repeatability::{Repeatability, of_the_gain, repeatability};
 
 use crate::report::numbers::{NOT_IDENTIFIABLE, estimated};
 
@@ -67,21 +68,20 @@ pub(crate) fn entries(r: &Report, has_pattern: bool) -> Vec<Entry> {
     if r.instrument == "gyroscope" && !has_pattern {
         out.extend(misalignment(r));
     }
-    let ppm = |k: &RunReport| Some(1e6 * k.angular_gain?.value / r.angular_gain.value);
-    let repeated = |of: &dyn Fn(&RunReport) -> Option<f64>, unit: &str| {
-        let sound = r.runs.iter().filter(|run| run.agrees != Some(false));
-        let told: Vec<f64> = sound.filter_map(of).filter(|v| v.is_finite()).collect();
-        spread(&told).map(|s| format!("{s:.1} {unit} over {} runs", told.len()))
-    };
-    if let Some(value) = repeated(&ppm, "ppm") {
+    let said = |r: Repeatability, unit: &str| format!("{:.1} {unit} over {} runs", r.deviation.value, r.runs);
+    if let Some(repeated) = of_the_gain(&r.runs, k) {
         out.push(entry(
             "scale factor, repeatability",
             "standard deviation of what each run says of k by itself",
-            value,
+            said(repeated, "ppm"),
         ));
     }
-    if let Some(value) = repeated(&|run| Some(3600.0 * run.bias_dps?.value), "deg/h") {
-        out.push(entry("bias, repeatability", "standard deviation of what each run says of its bias by itself", value));
+    if let Some(repeated) = repeatability(&r.runs, |run| Some(3600.0 * run.bias_dps?.value)) {
+        out.push(entry(
+            "bias, repeatability",
+            "standard deviation of what each run says of its bias by itself",
+            said(repeated, "deg/h"),
+        ));
     }
     out.push(entry("output noise", "white part of the angle error, rms", format!("{:.6}°", r.heldout.noise_floor_deg)));
     out
@@ -100,17 +100,6 @@ fn misalignment(r: &Report) -> Vec<Entry> {
         (None, reason) => format!("{}: {}", m.file, reason.as_deref().unwrap_or(NOT_IDENTIFIABLE)),
     });
     said.map(entry).collect()
-}
-
-/// Runs below which a spread is none.
-const FEWEST_RUNS: usize = 3;
-
-/// Standard deviation of what several runs say.
-fn spread(values: &[f64]) -> Option<f64> {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let square = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-    (values.len() >= FEWEST_RUNS).then(|| (square / (n - 1.0)).sqrt())
 }
 
 /// The first parameter of an effect that was found.

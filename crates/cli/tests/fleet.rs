@@ -76,8 +76,14 @@ fn every_device_is_a_row_and_the_odd_one_is_named() {
     assert!(outcome.stdout.contains("refused: "), "{}", outcome.stdout);
 
     let page = fs::read_to_string(out.path().join("fleet.html")).unwrap();
-    for wanted in ["11 of 12 answered, 1 odd", "detection-cubic: gains", "an exception", "by serial number", "unit-03"]
-    {
+    for wanted in [
+        "11 of 12 answered, 1 odd",
+        "detection-cubic: gains",
+        "an exception",
+        "by serial number",
+        "unit-03",
+        "<summary>fleet.json<",
+    ] {
         assert!(page.contains(wanted), "{wanted}");
     }
     let line = &facts["quantities"]["detection_gain_ratio"];

@@ -156,6 +156,50 @@ fn what_moved_between_two_answers_is_told_and_what_did_not_is_not() {
 }
 
 #[test]
+fn an_effect_that_came_has_moved_and_a_declared_one_that_was_not_told_has_not() {
+    let bench = Bench::small();
+    let (before, after) = (identified(&bench).join("report.json"), bench.path("after.json"));
+    let mut more: Value = serde_json::from_slice(&fs::read(&before).unwrap()).unwrap();
+    let effect = |id: &str, origin: &str, name: &str, [value, low, high]: [f64; 3]| {
+        let parameter = serde_json::json!({"name": name, "unit": "1", "value": value, "ci95": [low, high]});
+        serde_json::json!({"id": id, "origin": origin, "parameters": [parameter]})
+    };
+    let found = [
+        effect("detection-cubic", "discovered", "kappa", [4e-3, 3e-3, 5e-3]),
+        effect("detection-skew", "discovered", "skew", [1e-3, -1e-3, 3e-3]),
+        effect("anisoelasticity", "declared", "anisoelasticity", [0.2, 0.1, 0.3]),
+    ];
+    let effects = more["effects"].as_array_mut().unwrap();
+    effects.retain(|e| !found.iter().any(|f| f["id"] == e["id"]));
+    let mut fewer = more.clone();
+    more["effects"].as_array_mut().unwrap().extend(found);
+    fewer["runs"] = Value::Array(Vec::new());
+    fs::write(&after, more.to_string()).unwrap();
+    let without = bench.path("without.json");
+    fs::write(&without, fewer.to_string()).unwrap();
+    for (pair, word) in [([&without, &after], "came"), ([&after, &without], "went")] {
+        let said = run(&[&"compare", pair[0], pair[1]]);
+        let last = said.stdout.lines().last().unwrap();
+        assert_eq!(last, "moved beyond the combined 95 % intervals: detection-cubic.kappa", "{}", said.stdout);
+        let line = said.stdout.lines().find(|line| line.starts_with("detection-cubic.kappa")).unwrap();
+        assert!(line.contains(word), "{line}");
+    }
+    let facts: Value = serde_json::from_str(&run(&[&"compare", &without, &after, &"--json"]).stdout).unwrap();
+    assert_eq!(facts["moved"], 1);
+}
+
+#[test]
+fn a_calibration_is_compared_with_its_report_by_the_names_of_reports() {
+    let mut settings = cvg_simulator::Scenario::paper().settings().clone();
+    settings.runs.retain(|r| !matches!(r, cvg_simulator::scenario::Run::Rotation { file, .. } if file.contains("low")));
+    let bench = Bench::simulated(settings);
+    let out = identified(&bench);
+    let said = run(&[&"compare", &out, &out.join("calibration.toml")]);
+    assert!(said.stdout.contains("anisodamping.theta_tau"), "{}", said.stdout);
+    assert!(!said.stdout.contains("only in") && !said.stdout.contains("differs"), "{}", said.stdout);
+}
+
+#[test]
 fn two_calibrations_are_compared_by_value() {
     let bench = Bench::small();
     let calibration = identified(&bench).join("calibration.toml");

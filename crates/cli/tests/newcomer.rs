@@ -173,3 +173,29 @@ fn the_readme_shows_the_table_that_this_test_uses() {
         assert!(readme.lines().any(|l| l.split('#').next().unwrap().trim() == line), "README.md lacks {line}");
     }
 }
+
+#[test]
+fn what_looks_like_a_sensor_is_said_to_and_asked_for_no_commands_of_a_gyroscope() {
+    let bench = Bench::small();
+    let rows = |rate: f64, step_s: f64| -> String {
+        let row = |i: u32| {
+            let t = step_s * f64::from(i);
+            let (sin, cos) = (rate * t).to_radians().sin_cos();
+            format!("{t},{rate},{:.0},{:.0}\n", 900.0 * cos + 100.0, 930.0 * sin - 50.0)
+        };
+        format!("t_s,rate_dps,xc_v,yc_v\n{}", (0..3000).map(row).collect::<String>())
+    };
+    bench.write("hall.csv", rows(40.0, 0.01));
+    let said = run(&[&"inspect", &bench.path("hall.csv")]);
+    assert!(said.contains("look like a sin/cos sensor: --sensor") && !said.contains("vas_v"), "{said}");
+    assert!(said.contains("nothing is wrong with it"), "{said}");
+    // seconds that are milliseconds
+    bench.write("slow.csv", rows(403.0, 10.0));
+    let said = run(&[&"inspect", &bench.path("slow.csv")]);
+    assert!(said.contains("turns by 4030° from row to row") && !said.contains("nothing is wrong"), "{said}");
+    // a campaign says what it is of
+    bench
+        .write("hall.toml", "[campaign]\ninstrument = \"sensor\"\n[[run]]\nkind = \"rotation\"\nfile = \"hall.csv\"\n");
+    let said = run(&[&"inspect", &bench.path("hall.toml")]);
+    assert!(!said.contains("vas_v") && !said.contains("--sensor"), "{said}");
+}

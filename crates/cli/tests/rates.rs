@@ -71,11 +71,19 @@ fn scale_factor_and_bias_repeat_from_run_to_run_as_planted() {
         .enumerate()
         .map(|(i, (ppm, bias))| stepped(&rates, 0.0, [0.98 * (1.0 + 1e-6 * ppm), *bias], i as u64))
         .collect();
-    let (_, page) = identified(&runs);
+    let (report, page) = identified(&runs);
+    let [value, low, high] = estimate(&report["repeatability_ppm"]);
+    assert!((value / 500.0 - 1.0).abs() < 0.1 && low < value && value < high, "{value} in {low} … {high}");
+    assert!(report["runs"].as_array().unwrap().iter().all(|run| run["way"] == "both"), "{}", report["runs"]);
+    let units =
+        report["warnings"].as_array().unwrap().iter().filter(|w| w.as_str().unwrap().contains("is the integral of"));
+    let units: Vec<&Value> = units.collect();
+    assert!(units.len() == 1 && units[0].as_str().unwrap().starts_with("0.csv and 2 other files: "), "{units:?}");
     for (term, planted, unit) in
         [("scale factor, repeatability", 500.0, "ppm"), ("bias, repeatability", 906.0, "deg/h")]
     {
-        let row = page.split_once(term).unwrap_or_else(|| panic!("{term} is not there")).1;
+        let standard = page.split_once("id=\"standard\"").unwrap().1;
+        let row = standard.split_once(term).unwrap_or_else(|| panic!("{term} is not there")).1;
         let row = row.split_once("</tr>").unwrap().0;
         let value = row.split(['>', '<']).find_map(|cell| cell.strip_suffix(&format!(" {unit} over 3 runs"))).unwrap();
         let value: f64 = value.parse().unwrap();

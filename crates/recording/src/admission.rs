@@ -66,7 +66,7 @@ fn convert(
     source: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<Option<String>, ReadError> {
-    let mut kept = None;
+    let (mut kept, mut taken) = (None, Taken::default());
     let is_readout = |channel| matches!(channel, Channel::Xc | Channel::Xs | Channel::Yc | Channel::Ys);
     let of_readout: Vec<&str> = table.units.iter().filter(|(c, _)| is_readout(*c)).map(|(_, u)| u.as_str()).collect();
     let is_one = of_readout.windows(2).all(|pair| pair[0] == pair[1]);
@@ -88,7 +88,7 @@ fn convert(
                 Some(by) => by,
                 // a sensor's channels may be in any unit that both have
                 None if is_readout(channel) && is_one => {
-                    warnings.push(format!("`{channel}` is in {unit} and kept in it"));
+                    taken.say(channel, format!("in {unit} and kept in it"));
                     kept = Some(units::bare(unit).to_owned());
                     continue;
                 }
@@ -104,7 +104,7 @@ fn convert(
                 let taken = units::of_channel(naming.wanted(channel));
                 warnings.push(format!("`{channel}`: {unit} is no unit that is known; it is taken for {taken}"));
             } else if in_brackets.windows(2).all(|pair| pair[0] == pair[1]) {
-                warnings.push(format!("`{channel}` is in {unit} and kept in it"));
+                taken.say(channel, format!("in {unit} and kept in it"));
                 kept = Some(if units::is_count(unit) { "counts" } else { unit }.to_owned());
             }
             Conversion::NONE
@@ -128,12 +128,32 @@ fn convert(
             continue;
         }
         if let (None, Some(unit)) = (naming.factor(channel), own.or(naming.unit(channel).map(|(unit, _)| unit))) {
-            warnings
-                .push(format!("`{channel}` is in {unit} and taken to {}", units::of_channel(naming.wanted(channel))));
+            taken.say(channel, format!("in {unit} and taken to {}", units::of_channel(naming.wanted(channel))));
         }
         column.values.iter_mut().for_each(|value| *value = by.of(*value));
     }
+    warnings.extend(taken.in_words());
     Ok(kept)
+}
+
+/// In which unit channels are and what becomes of it, the channels of one unit together.
+#[derive(Default)]
+struct Taken(Vec<(String, Vec<Channel>)>);
+
+impl Taken {
+    fn say(&mut self, channel: Channel, what: String) {
+        match self.0.iter_mut().find(|(other, _)| *other == what) {
+            Some((_, channels)) => channels.push(channel),
+            None => self.0.push((what, vec![channel])),
+        }
+    }
+
+    fn in_words(self) -> impl Iterator<Item = String> {
+        self.0.into_iter().map(|(what, channels)| {
+            let are = if channels.len() > 1 { "are" } else { "is" };
+            format!("{} {are} {what}", requirement::in_words(channels.iter().map(|channel| channel.name())))
+        })
+    }
 }
 
 /// Puts the integral over time, from zero on, in the place of rates that are mapped to an angle.

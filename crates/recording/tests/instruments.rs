@@ -114,7 +114,7 @@ fn a_factor_stands_over_the_unit_it_agrees_with() {
 fn channels_in_counts_or_in_a_field_are_kept_in_it_together() {
     let recording = read("t_s,xc_v,yc_v\ns,counts,counts\n0,100,0\n1,0,100\n", &[]).unwrap();
     assert_eq!(recording.xc_v.as_deref(), Some(&[100.0, 0.0][..]));
-    assert_warns(&recording, "`xc_v` is in counts and kept in it");
+    assert_warns(&recording, "`xc_v`, `yc_v` are in counts and kept in it");
     assert_eq!(recording.readout_unit.as_deref(), Some("counts"));
     let said = refusal("t_s,xc_v,yc_v\ns,uT,mT\n0,100,0\n1,0,100\n", &[]);
     assert!(said.contains("`xc_v` is in \"uT\"; wanted V"), "{said}");
@@ -124,7 +124,7 @@ fn channels_in_counts_or_in_a_field_are_kept_in_it_together() {
 fn currents_of_photodiodes_are_no_missing_values() {
     let recording = read("t_s,xc_v,yc_v\ns,nA,nA\n0,100,0\n1,0,100\n", &[]).unwrap();
     assert_eq!(recording.readout_unit.as_deref(), Some("nA"));
-    assert_warns(&recording, "`xc_v` is in nA and kept in it");
+    assert_warns(&recording, "`xc_v`, `yc_v` are in nA and kept in it");
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn a_labview_file_is_read_below_what_it_says_of_itself() {
         assert_eq!(recording.t_s, [0.0, 0.1, 0.2]);
         assert_eq!(recording.xc_v.as_deref(), Some(&[1.0, 0.5, 0.0][..]));
         assert_warns(&recording, "lines 1 to 16, above the header, are passed over");
-        assert_warns(&recording, "`xc_v` is in Millivolts and taken to V");
+        assert_warns(&recording, "`xc_v`, `yc_v` are in Millivolts and taken to V");
         assert_eq!(recording.unknown[0].cells.iter().collect::<Vec<_>>(), ["start", "", ""]);
     }
 }

@@ -142,7 +142,7 @@ pub(crate) fn identify(
         (fitted, model) = without_odd_runs(fitted, identify, &mut left_out)?;
         held.retain(|run| !all.contains(&run.number) || fitted.iter().any(|f| f.number == run.number));
         held = held_out_as_fitted(held, &fitted, &model, period, &mut left_out)?;
-        sensor_finding(asked, model, thermal.as_ref(), [&fitted, &held], texts)?
+        sensor_finding(asked, model, thermal.as_ref(), [&fitted, &held], &texts)?
     };
     finding.warnings.extend(left_out);
     finding.warnings.extend(why_not);
@@ -379,10 +379,10 @@ fn sensor_finding(
     model: SensorModel,
     thermal: Option<&Thermal>,
     [runs, held]: [&[SensorRun]; 2],
-    texts: Vec<EffectId>,
+    texts: &[EffectId],
 ) -> Result<Finding<'static>, Refusal> {
     let Asked { stated, sense, period, rates_alone } = asked;
-    let (model, mut deviations) = identified(asked, model, [runs, held], texts.clone())?;
+    let (model, mut deviations) = identified(asked, model, [runs, held], texts.to_vec())?;
     if let (Some(thermal), Some(readout)) = (thermal, model.front()) {
         thermal.widen(&mut deviations, LibraryReadout::from(readout).gain_ratio, runs);
     }
@@ -420,7 +420,7 @@ fn sensor_finding(
         hypothesis.members.extend(thermal.members());
         hypothesis.members.sort_by_key(|m| m.id);
     }
-    warnings.extend(not_taken(&texts, &hypothesis));
+    warnings.extend(not_taken(texts, &hypothesis));
     Ok(Finding {
         instrument: Instrument::Sensor,
         stated_gain: stated,

@@ -8,7 +8,7 @@ use crate::recording::{Campaign, Instrument, RunKind};
 const WHOLE: f64 = 0.01;
 
 /// What to try where the recordings look like another kind of instrument.
-pub(crate) fn hint(campaign: &Campaign) -> Option<&'static str> {
+pub fn hint(campaign: &Campaign) -> Option<&'static str> {
     match campaign.instrument {
         Instrument::Gyroscope => looks_like_a_sensor(campaign).then_some(
             "two channels without a quadrature part, which go round a whole number of times a turn, look like a sin/cos \

@@ -26,6 +26,7 @@ use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
 use crate::report::provenance;
 use crate::report::recorded::{run_report, set_aside};
+use crate::report::repeatability::of_the_gain;
 use crate::report::stages::stages;
 use crate::report::unexplained::{against_a_command, left_over, residual_report};
 use crate::report::{
@@ -234,10 +235,11 @@ pub(crate) fn report(
         steps,
         residual,
         channels: Vec::new(),
-        runs: reported,
         decomposition: finding.decomposition.clone(),
         proposals: Vec::new(),
         scale_factor: finding.scale_factor,
+        repeatability_ppm: of_the_gain(&reported, angular_gain).map(|told| told.deviation),
+        runs: reported,
         misalignment: Vec::new(),
         allan: None,
         temperature,

@@ -139,6 +139,7 @@ pub(crate) fn report(
         decomposition: Vec::new(),
         proposals: Vec::new(),
         scale_factor: None,
+        repeatability_ppm: None,
         misalignment: Vec::new(),
         allan: None,
         temperature: None,

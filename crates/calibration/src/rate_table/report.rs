@@ -25,6 +25,7 @@ use crate::report::gate::{self, Facts, unusual_gain};
 use crate::report::inference::Inference;
 use crate::report::proposals::proposals;
 use crate::report::recorded::set_aside;
+use crate::report::repeatability::of_the_gain;
 use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
@@ -115,10 +116,11 @@ impl Found {
             residual: residual_report(&self.errors.on_fit, &self.errors.discovered),
             channels: channels_left,
             unexplained,
-            runs,
             decomposition: shares(&self.errors.declared_on_fit, &amplitudes),
             proposals,
             scale_factor: self.scale_factor,
+            repeatability_ppm: of_the_gain(&runs, angular_gain).map(|told| told.deviation),
+            runs,
             misalignment: Vec::new(),
             allan: None,
             temperature,

@@ -14,10 +14,13 @@ pub(crate) mod proposals;
 pub(crate) mod provenance;
 pub(crate) mod recorded;
 pub mod refused;
+pub mod repeatability;
 pub(crate) mod runs;
 pub(crate) mod stages;
 pub mod survey;
 pub(crate) mod unexplained;
+pub(crate) mod way;
+pub(crate) mod worded;
 
 pub use crate::facts::*;
 

@@ -2,6 +2,7 @@
 
 use crate::recording::{Dropped, Run, RunKind};
 use crate::report::RunReport;
+use crate::report::way::way;
 
 /// The run as it was read, not yet used.
 pub(crate) fn run_report(run: &Run) -> RunReport {
@@ -17,6 +18,7 @@ pub(crate) fn run_report(run: &Run) -> RunReport {
         rows: run.recording.reference_hz.map_or(run.recording.len(), |_| rows_read(d)),
         dropped: dropped(d),
         rate_dps: None,
+        way: way(run).map(str::to_owned),
         spikes: 0,
         tau_s: None,
         angular_gain: None,

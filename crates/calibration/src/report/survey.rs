@@ -117,6 +117,7 @@ pub struct Survey {
     decomposition: [(); 0],
     proposals: [(); 0],
     scale_factor: Option<()>,
+    repeatability_ppm: Option<()>,
     /// what virtual precession and unknown rotation told; null without such runs
     pub virtual_precession: Option<VirtualPrecession>,
     /// how far the angle wanders at rest; null without a run at rest
@@ -152,6 +153,7 @@ impl Survey {
             decomposition: [],
             proposals: [],
             scale_factor: None,
+            repeatability_ppm: None,
             virtual_precession: None,
             allan: None,
             temperature: None,

@@ -15,7 +15,7 @@ const ENDS: f64 = 2.0 * 1.96;
 const ALL_AROUND_DEG: f64 = 360.0 * 0.999;
 
 /// What is kept of a report; the rest is many times as large, and thousands of devices are in memory at once.
-const KEPT: [&str; 12] = [
+const KEPT: [&str; 13] = [
     "device",
     "status",
     "reason",
@@ -23,6 +23,7 @@ const KEPT: [&str; 12] = [
     "detection_gain_ratio",
     "actuation_gain_ratio",
     "scale_factor",
+    "repeatability_ppm",
     "allan",
     "effects",
     "steps",

@@ -215,16 +215,18 @@ fn harmonics(plots: &PlotData, angle: &str) -> Option<Figure> {
     let traces = plots.stages.iter().map(|(name, list)| {
         json!({
             "type": "bar", "name": name, "marker": {"color": format!("@{name}")},
-            "x": list.iter().map(|h| format!("{}θ", h.n)).collect::<Vec<_>>(),
+            "x": list.iter().map(|h| h.n.to_string()).collect::<Vec<_>>(),
             "y": shorts(list.iter().map(|h| h.amplitude_deg)),
             "error_y": {"type": "data", "array": shorts(list.iter().map(|h| h.ci95_deg)), "color": "@muted", "width": 3},
-            "hovertemplate": "%{x}: %{y:.6f}°",
+            "hovertemplate": "harmonic %{x}: %{y:.6f}°",
         })
     });
     let mut layout = json!({
         "barmode": "group", "xaxis": axis(&format!("harmonic of the {angle}")),
         "yaxis": {"title": {"text": "amplitude [deg]"}, "type": "log", "exponentformat": "power", "dtick": 1},
     });
+    // numbers of harmonics, each with a place of its own: none stands between two of them
+    layout["xaxis"]["type"] = json!("category");
     let largest = plots.stages.iter().flat_map(|(_, list)| list).fold(0.0, |m: f64, h| m.max(h.amplitude_deg));
     if largest < LEAST_DEG {
         layout["yaxis"]["range"] = json!([LEAST_DEG.log10() - 1.0, LEAST_DEG.log10() + 1.0]);

@@ -44,7 +44,7 @@ pub(crate) fn page(population: &Population, devices: &[Device], facts: &Value) -
     others(&mut h, devices);
     let footer = "Odd: in a fleet without an odd device, at most one in twenty has one named by its values.";
     let json = serde_json::to_string_pretty(facts).map_err(Failure::input)?;
-    finish(&mut h, &json, facts["schema"].as_str().unwrap_or_default(), footer, &figures)?;
+    finish(&mut h, ["fleet.json", &json], facts["schema"].as_str().unwrap_or_default(), footer, &figures)?;
     Ok(h)
 }
 
@@ -198,7 +198,7 @@ fn course(number: usize, name: &str, line: &Line, population: &Population, devic
         "xaxis2": {"title": {"text": "devices"}, "domain": [0.83, 1.0]}, "yaxis": {}, "bargap": 0.05,
     });
     let caption = "By serial number, with limits of three deviations of neighbours: what changes slowly leaves them. Beside \
-                   it, how many devices have which value.";
+                   or below it, how many devices have which value.";
     Some(Figure::new(&format!("quantity-{number}"), name, caption, traces, layout))
 }
 

@@ -15,8 +15,10 @@ pub(crate) struct Number<'a> {
 /// Those of a report, in the order in which they are read.
 pub(crate) fn further(r: &Report) -> Vec<Number<'_>> {
     let scale = r.scale_factor.iter().flat_map(|s| {
-        [("scale factor, nonlinearity", s.nonlinearity_ppm, "ppm"), ("scale factor, asymmetry", s.asymmetry_ppm, "ppm")]
+        let told = [("scale factor, nonlinearity", s.nonlinearity_ppm), ("scale factor, asymmetry", s.asymmetry_ppm)];
+        told.into_iter().map(|(name, value)| (name, value, "ppm"))
     });
+    let scale = scale.chain(r.repeatability_ppm.map(|value| ("scale factor, repeatability", value, "ppm")));
     let rest = r.allan.iter().flat_map(|a| {
         let walk = a.angle_random_walk_deg_sqrt_h.map(|e| ("angle random walk", e, "deg/√h"));
         walk.into_iter().chain([("bias instability", a.bias_instability_dph, "deg/h")])

@@ -60,7 +60,7 @@ pub(crate) fn page(identified: &Identification) -> Result<String, Failure> {
     draw(&mut h, &format!("{without}{still}"), &figures);
     tables::besides(&mut h, identified);
     let footer = "Errors are angle minus the best line, angular gain and bias refitted on the same held-out samples.";
-    finish(&mut h, &json(identified)?, &r.schema, footer, &figures)?;
+    finish(&mut h, ["report.json", &json(identified)?], &r.schema, footer, &figures)?;
     Ok(h)
 }
 
@@ -78,11 +78,17 @@ fn begin(h: &mut String, device: &str, instrument: &str) {
     );
 }
 
-/// The facts for programs, the footer, and what the figures are drawn from.
-fn finish(h: &mut String, json: &str, schema: &str, footer: &str, figures: &[Figure]) -> Result<(), Failure> {
+/// The facts for programs under the name of their file, the footer, and what the figures are drawn from.
+fn finish(
+    h: &mut String,
+    [named, json]: [&str; 2],
+    schema: &str,
+    footer: &str,
+    figures: &[Figure],
+) -> Result<(), Failure> {
     let _ = write!(
         h,
-        "<details><summary>report.json</summary><div class=\"scroll\" tabindex=\"0\"><pre>{}</pre></div></details></main>\
+        "<details><summary>{named}</summary><div class=\"scroll\" tabindex=\"0\"><pre>{}</pre></div></details></main>\
          <footer>cvg {}, schema {}. {footer}</footer>",
         escape(json),
         env!("CARGO_PKG_VERSION"),

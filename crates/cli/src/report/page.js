@@ -37,6 +37,12 @@
     }
     // nor for two panels beside each other: the second goes below the first
     if (layout.xaxis2 && layout.xaxis.domain && (width || innerWidth) < NARROW_PX) {
+      // with a y axis of its own, and the range of the first, where they had one together
+      if (!layout.yaxis2) {
+        layout.yaxis2 = { ...layout.yaxis, anchor: "x2", matches: "y" };
+        layout.xaxis2 = { ...layout.xaxis2, anchor: "y2" };
+        for (const trace of traces) if (trace.xaxis === "x2") trace.yaxis = "y2";
+      }
       for (const [x, y, domain] of [["xaxis", "yaxis", [0.6, 1]], ["xaxis2", "yaxis2", [0, 0.4]]]) {
         layout[x] = { ...layout[x], domain: [0, 1], nticks: 6 };
         layout[y] = { ...layout[y], domain, nticks: 5 };

@@ -37,7 +37,13 @@ pub(crate) fn page(surveyed: &Surveyed) -> Result<String, Failure> {
     temperature(&mut h, r.temperature.as_ref());
     files(&mut h, r);
     let json = serde_json::to_string_pretty(r).map_err(Failure::input)?;
-    finish(&mut h, &json, r.schema, "There is no angle error: nothing was recorded to count it against.", &figures)?;
+    finish(
+        &mut h,
+        ["report.json", &json],
+        r.schema,
+        "There is no angle error: nothing was recorded to count it against.",
+        &figures,
+    )?;
     Ok(h)
 }
 
@@ -153,7 +159,20 @@ fn files(h: &mut String, r: &Survey) {
     });
 }
 
-/// x over y, as recorded and after, with the circle that they should draw.
+/// Ticks of a logarithmic axis: powers of ten alone over two decades and more, and 1, 2 and 5 over less. All digits have no room below
+/// each other.
+fn ticks(values: impl Iterator<Item = f64>) -> usize {
+    /// How much longer an axis is than what it shows.
+    const MARGIN: f64 = 1.12;
+    let (low, high) =
+        values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
+    let decades = if high > low { MARGIN * (high / low).log10() } else { 0.0 };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decades")]
+    let whole = decades as usize;
+    (whole + 1).max(3)
+}
+
+/// The Allan deviation over the averaging time.
 fn deviation(allan: &Allan) -> Figure {
     let half = |i: usize| -> Vec<f64> {
         allan
@@ -170,6 +189,7 @@ fn deviation(allan: &Allan) -> Figure {
         json!({"xaxis": axis("averaging time [s]"), "yaxis": axis("deviation [deg/h]"), "showlegend": false});
     layout["xaxis"]["type"] = json!("log");
     layout["yaxis"]["type"] = json!("log");
+    layout["yaxis"]["nticks"] = json!(ticks(allan.points.iter().flat_map(|p| p.ci95)));
     let caption = "Overlapping Allan deviation at rest, with 95 % intervals: −1 is noise of the angle, −½ angle random walk, \
                    flat bias instability, +½ a random walk of the rate.";
     Figure::new("allan", "Allan deviation", caption, traces, layout)
@@ -225,4 +245,19 @@ pub(crate) fn summary(r: &Survey) -> String {
         line(format!("  warning: {w}"));
     }
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ticks;
+
+    #[test]
+    fn a_logarithmic_axis_has_no_more_ticks_than_leave_room_for_their_digits() {
+        // below 0.3 decades a tick every digit is written, above 0.7 none between powers of ten
+        for (low, high) in [(1.0, 1.5), (1.0, 11.0), (0.5, 20.0), (1.0, 900.0), (1e-4, 1e3)] {
+            let decades: f64 = f64::log10(high / low) / ticks([low, high].into_iter()) as f64;
+            assert!(decades < 0.3 && high / low < 10.0 || decades > 0.3 && decades < 1.0, "{low} to {high}: {decades}");
+        }
+        assert_eq!(ticks(std::iter::empty()), 3);
+    }
 }

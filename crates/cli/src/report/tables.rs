@@ -14,8 +14,6 @@ use crate::standard;
 
 /// Correlations that a reader should know of.
 const STRONG: f64 = 0.5;
-/// A mean rate below this, deg/s, is that of a rotation there and back.
-const BOTH_WAYS: f64 = 0.005;
 /// Periods beyond this are a whole turn, and no pattern's half.
 pub(crate) const WHOLE_TURN_RAD: f64 = 4.0;
 
@@ -360,8 +358,8 @@ fn files(h: &mut String, r: &Report) {
     table(h, "Recordings that were read", &columns, |h| {
         for x in &r.runs {
             let rate = match x.rate_dps {
-                // a rotation whose mean is nothing went there and back
-                Some(v) if x.kind == "rotation" && v.abs() < BOTH_WAYS => "both ways".to_owned(),
+                // the mean of a rotation there and back is the rate of none of its parts
+                Some(_) if x.way.as_deref() == Some("both") => "both ways".to_owned(),
                 Some(v) => format!("{v:.2}"),
                 None => "—".to_owned(),
             };
@@ -391,11 +389,9 @@ pub(super) fn runs(h: &mut String, runs: &[RunReport]) {
     ];
     table(h, "What each run tells by itself", &columns, |h| {
         for x in runs {
-            let way = match x.rate_dps {
+            let way = match &x.way {
                 _ if x.kind != "rotation" => x.kind.as_str(),
-                Some(v) if v >= BOTH_WAYS => "positive",
-                Some(v) if v <= -BOTH_WAYS => "negative",
-                Some(_) => "both",
+                Some(way) => way,
                 None => "—",
             };
             let agrees = x.agrees.map_or("—", |a| if a { "yes" } else { "no" });

@@ -1,14 +1,18 @@
 //! `cvg compare`: which parameters moved beyond what both answers leave open: before and after, two devices, today and last
 //! month.
 
+mod answer;
+mod effect;
+
+pub(crate) use answer::of_report;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
-use cvg_calibration::calibration::Calibration;
-use cvg_calibration::recording::read_text;
-use cvg_model::effects::{EffectId, Shown};
 use serde_json::{Value, json};
 
+use self::answer::{Told, alike};
+use self::effect::{goes_round, named};
 use crate::report::numbers::{interval, significant, with_half_width};
 use crate::{Failure, output};
 
@@ -25,27 +29,19 @@ pub struct Parameter {
     pub ci95: Option<[f64; 2]>,
 }
 
+/// Share of a value that is rounding.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
 /// A parameter of both answers, or of one.
 struct Pair {
     name: String,
     unit: String,
-    of: [Option<Parameter>; 2],
+    of: [Option<Told>; 2],
 }
-
-/// Estimates at the top of a report, and the unit of each.
-const ESTIMATES: [(&str, &str); 7] = [
-    ("/angular_gain", "1"),
-    ("/detection_gain_ratio", "1"),
-    ("/actuation_gain_ratio", "1"),
-    ("/scale_factor/nonlinearity_ppm", "ppm"),
-    ("/scale_factor/asymmetry_ppm", "ppm"),
-    ("/allan/angle_random_walk_deg_sqrt_h", "deg/√h"),
-    ("/allan/bias_instability_dph", "deg/h"),
-];
 
 /// Compares two answers.
 pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
-    let [of_a, of_b] = [answer(a)?, answer(b)?];
+    let [of_a, of_b] = [answer::read(a)?, answer::read(b)?];
     if of_a.instrument != of_b.instrument {
         return Err(Failure::input(format!(
             "{} is of a {}, {} of a {}: their parameters are not the same quantities; wanted two answers about one kind of \
@@ -59,7 +55,8 @@ pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
     if of_a.device != of_b.device {
         output::tell(format_args!("A is of {}, B of {}", of_a.device, of_b.device));
     }
-    let pairs = paired(of_a.parameters, of_b.parameters);
+    let [of_a, of_b] = alike([of_a, of_b]);
+    let pairs = paired(of_a, of_b);
     if json {
         let list: Vec<Value> = pairs.iter().map(Pair::as_value).collect();
         let moved = pairs.iter().filter(|p| p.moved() == Some(true)).count();
@@ -71,82 +68,7 @@ pub(crate) fn compare(a: &Path, b: &Path, json: bool) -> Result<(), Failure> {
     output::answer(&in_words(&pairs))
 }
 
-/// What is compared: the parameters of an instrument.
-struct Answer {
-    device: String,
-    instrument: String,
-    parameters: Vec<Parameter>,
-}
-
-/// The parameters of a report, of the report in a folder, or of a calibration.
-fn answer(path: &Path) -> Result<Answer, Failure> {
-    let bad = |what: String| {
-        let wanted = "report.json, a folder with one, or calibration.toml, as cvg identify writes them";
-        Failure::input(format!("{}: {what}; wanted {wanted}", path.display()))
-    };
-    let file = if path.is_dir() { path.join("report.json") } else { path.to_owned() };
-    if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let calibration = Calibration::read(&file)?;
-        return Ok(Answer {
-            instrument: calibration.hypothesis.instrument.name().to_owned(),
-            parameters: of_calibration(&calibration),
-            device: calibration.device,
-        });
-    }
-    let text = read_text(&file).map_err(|e| bad(format!("cannot be read: {e}")))?;
-    let report: Value = serde_json::from_str(&text).map_err(|e| bad(format!("is no report: {e}")))?;
-    if !report["schema"].as_str().is_some_and(|s| s.starts_with("cvg.report/")) {
-        return Err(bad("is no report".into()));
-    }
-    if report["status"] == "refused" {
-        return Err(bad("has no answer (refused)".into()));
-    }
-    let text = |key: &str| report[key].as_str().unwrap_or_default().to_owned();
-    Ok(Answer { device: text("device"), instrument: text("instrument"), parameters: of_report(&report) })
-}
-
-/// The parameters of a report.
-pub(crate) fn of_report(report: &Value) -> Vec<Parameter> {
-    let mut out: Vec<Parameter> = ESTIMATES
-        .iter()
-        .filter_map(|(at, unit)| parameter(at.trim_start_matches('/').replace('/', "."), unit, report.pointer(at)?))
-        .collect();
-    let list = |v: &Value| v.as_array().cloned().unwrap_or_default();
-    for effect in list(&report["effects"]) {
-        let id = effect["id"].as_str().unwrap_or_default();
-        let parameters = list(&effect["parameters"]);
-        // effects of a searched number may be there more than once
-        let number = parameters.iter().find(|p| p["name"] == "n").and_then(|p| p["value"].as_f64());
-        let id = number.map_or(id.to_owned(), |n| format!("{id}[{n}]"));
-        let name = |p: &Value| format!("{id}.{}", p["name"].as_str().unwrap_or_default());
-        out.extend(parameters.iter().filter_map(|p| parameter(name(p), p["unit"].as_str().unwrap_or("1"), p)));
-    }
-    for run in list(&report["runs"]) {
-        let file = run["file"].as_str().unwrap_or_default();
-        out.extend(parameter(format!("{file}.tau_s"), "s", &run["tau_s"]));
-    }
-    out
-}
-
-fn parameter(name: String, unit: &str, value: &Value) -> Option<Parameter> {
-    let ends = [&value["ci95"][0], &value["ci95"][1]].map(Value::as_f64);
-    let ci95 = ends[0].zip(ends[1]).map(|(low, high)| [low, high]);
-    Some(Parameter { name, unit: unit.to_owned(), value: value["value"].as_f64()?, ci95 })
-}
-
-fn of_calibration(calibration: &Calibration) -> Vec<Parameter> {
-    let h = &calibration.hypothesis;
-    let bare = |name: String, unit: &str, value: f64| Parameter { name, unit: unit.to_owned(), value, ci95: None };
-    let gain = (!calibration.provenance.gain_unknown).then(|| bare("angular_gain".into(), "1", h.angular_gain));
-    let mut out: Vec<Parameter> = gain.into_iter().collect();
-    for m in &h.members {
-        let parameters = m.id.description().parameters.iter().zip(m.values);
-        out.extend(parameters.map(|(p, v)| bare(format!("{}.{}", m.id, p.name), p.unit, v)));
-    }
-    out
-}
-
-fn paired(a: Vec<Parameter>, mut b: Vec<Parameter>) -> Vec<Pair> {
+fn paired(a: Vec<Told>, mut b: Vec<Told>) -> Vec<Pair> {
     let mut out: Vec<Pair> = Vec::new();
     for one in a {
         let other = b.iter().position(|p| p.name == one.name).map(|at| b.remove(at));
@@ -159,25 +81,11 @@ fn paired(a: Vec<Parameter>, mut b: Vec<Parameter>) -> Vec<Pair> {
 impl Pair {
     fn difference(&self) -> Option<f64> {
         let [a, b] = &self.of;
-        let d = b.as_ref()?.value - a.as_ref()?.value;
-        let round = self.goes_round();
+        let [a, b] = [a.as_ref()?.value, b.as_ref()?.value];
+        // two that are the same in both but for the last digits of the arithmetic
+        let d = if (b - a).abs() > ROUNDING * a.abs().max(b.abs()) { b - a } else { 0.0 };
+        let round = named(&self.name).map_or(f64::INFINITY, |(id, name)| goes_round(id, name, &self.unit));
         Some(if round.is_finite() { d - round * (d / round).round() } else { d })
-    }
-
-    /// After how much a parameter is the same again, in its unit: a phase after a turn, an axis after half of one, all else never.
-    fn goes_round(&self) -> f64 {
-        if self.unit != "deg" {
-            return f64::INFINITY;
-        }
-        let shown = |(id, name): (&str, &str)| {
-            let effect = EffectId::ALL.iter().find(|effect| effect.description().id == id)?;
-            let division = |shown: &Shown| match shown {
-                Shown::Polar { angle, division, .. } if *angle == name => Some(*division),
-                _ => None,
-            };
-            effect.description().shown.iter().find_map(division)
-        };
-        360.0 / self.name.split_once('.').and_then(shown).unwrap_or(1.0)
     }
 
     /// Half width of the difference's interval: that of either value towards the other, in quadrature.
@@ -189,14 +97,21 @@ impl Pair {
         Some(side(a, up)?.hypot(side(b, !up)?))
     }
 
-    /// Whether it moved beyond what both leave open; none where one of them has no interval, or did not tell it.
+    /// Whether it moved beyond what both leave open; none where one of them has no interval. What only one of them tells of an effect
+    /// came or went where its interval leaves out what it is without the effect.
     fn moved(&self) -> Option<bool> {
-        Some(self.difference()?.abs() > self.combined()?)
+        match &self.of {
+            [Some(_), Some(_)] => Some(self.difference()?.abs() > self.combined()?),
+            [Some(alone), None] | [None, Some(alone)] => alone.is_more_than_nothing(),
+            [None, None] => None,
+        }
     }
 
     /// What came of it, in a word or two.
     fn verdict(&self) -> &'static str {
         match (&self.of, self.moved()) {
+            ([Some(_), None], Some(true)) => "went: only in A",
+            ([None, _], Some(true)) => "came: only in B",
             ([Some(_), None], _) => "only in A",
             ([None, _], _) => "only in B",
             (_, Some(true)) => "moved",
@@ -207,7 +122,7 @@ impl Pair {
     }
 
     fn as_value(&self) -> Value {
-        let of = |p: &Option<Parameter>| p.as_ref().map(|p| json!({"value": p.value, "ci95": p.ci95}));
+        let of = |p: &Option<Told>| p.as_ref().map(|p| json!({"value": p.value, "ci95": p.ci95}));
         json!({"name": self.name, "unit": self.unit, "a": of(&self.of[0]), "b": of(&self.of[1]),
                "difference": self.difference(), "combined95": self.combined(), "moved": self.moved()})
     }
@@ -218,7 +133,7 @@ fn in_words(pairs: &[Pair]) -> String {
     let or_none = |text: Option<String>| text.unwrap_or("—".to_owned());
     let mut rows = vec![columns];
     rows.extend(pairs.iter().map(|p| {
-        let own = |p: &Parameter| p.ci95.map_or(significant(p.value), |ci95| interval(p.value, ci95)[0].clone());
+        let own = |p: &Told| p.ci95.map_or(significant(p.value), |ci95| interval(p.value, ci95)[0].clone());
         let of = |i: usize| or_none(p.of[i].as_ref().map(own));
         let [d, c] = match (p.difference(), p.combined()) {
             (Some(d), Some(c)) => with_half_width(d, c),
@@ -256,14 +171,41 @@ fn in_words(pairs: &[Pair]) -> String {
 mod tests {
     use super::*;
 
+    fn told(name: &str, unit: &str, value: f64, ci95: Option<[f64; 2]>) -> Told {
+        let parameter = Parameter { name: name.into(), unit: unit.into(), value, ci95 };
+        Told { absent: named(name).and_then(|(id, name)| effect::absent(id, name)), in_calibrations: true, parameter }
+    }
+
     #[test]
     fn an_axis_goes_round_after_half_a_turn_and_a_phase_after_a_whole_one() {
         let moved = |name: &str, [a, b]: [f64; 2]| {
-            let of = |value| Some(Parameter { name: name.into(), unit: "deg".into(), value, ci95: None });
+            let of = |value| Some(told(name, "deg", value, None));
             Pair { name: name.into(), unit: "deg".into(), of: [of(a), of(b)] }.difference().unwrap_or(f64::NAN)
         };
         assert!((moved("anisodamping.theta_tau", [89.9, -89.9]) - 0.2).abs() < 1e-9);
         assert!((moved("spring-cubic.phase", [179.9, -179.9]) - 0.2).abs() < 1e-9);
         assert!((moved("spring-cubic.phase", [89.9, -89.9]) + 179.8).abs() < 1e-9);
+        assert!((moved("harmonic-n[4].phase", [179.9, -179.9]) - 0.2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_effect_of_one_answer_has_moved_where_its_interval_leaves_out_nothing() {
+        let moved = |name: &str, ci95: [f64; 2]| {
+            let pairs = paired(Vec::new(), vec![told(name, "1", 0.5 * (ci95[0] + ci95[1]), Some(ci95))]);
+            assert_eq!(
+                in_words(&pairs).lines().last().is_some_and(|l| l.ends_with(name)),
+                pairs[0].moved() == Some(true)
+            );
+            pairs[0].moved()
+        };
+        assert_eq!(moved("detection-cubic.kappa", [0.003, 0.005]), Some(true));
+        assert_eq!(moved("detection-cubic.kappa", [-0.001, 0.005]), Some(false));
+        // what is nothing of a ratio is 1
+        assert_eq!(moved("detection-gain-mismatch.detection_gain_ratio", [0.9, 1.1]), Some(false));
+        assert_eq!(moved("detection-gain-mismatch.detection_gain_ratio", [1.01, 1.02]), Some(true));
+        assert_eq!(moved("angle-table.cos_3", [0.1, 0.2]), Some(true));
+        // an angle is none without its magnitude, and of a text nothing says what it is without it
+        assert_eq!(moved("spring-cubic.phase", [10.0, 20.0]), None);
+        assert_eq!(moved("my-quintic.kappa5", [0.1, 0.2]), None);
     }
 }

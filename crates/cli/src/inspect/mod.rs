@@ -1,9 +1,11 @@
 //! `cvg inspect`: what is in a file, and what is wrong with it.
 
+mod doubts;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Naming, ReadError, Recording, RunKind};
+use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, RunKind};
 use serde_json::{Value, json};
 
 use crate::figure::{BLUE, GREEN, PURPLE, Series, VERMILLION, panels, panels_png};
@@ -26,7 +28,7 @@ pub(crate) fn inspect(
     let files = input::files(names)?;
     for file in &files {
         let mut inputs = files.clone();
-        let recordings = if input::is_campaign(file) {
+        let (instrument, recordings) = if input::is_campaign(file) {
             let campaign = Campaign::open_named(file, naming).map_err(input::explained)?;
             inputs.extend(input::sources(&campaign));
             if !as_json {
@@ -36,13 +38,14 @@ pub(crate) fn inspect(
                     output::answer(&format!("  warning: {w}\n"))?;
                 }
             }
-            campaign.runs.into_iter().map(|run| (Some(run.kind), run.recording)).collect()
+            let runs = campaign.runs.into_iter();
+            (Some(campaign.instrument), runs.map(|run| (Some(run.kind), run.recording)).collect())
         } else {
             let read = input::read(file, naming);
             if let (false, Err(error)) = (as_json, &read) {
                 output::answer(&unnamed(file, error))?;
             }
-            vec![(None, read.map_err(input::explained)?)]
+            (None, vec![(None, read.map_err(input::explained)?)])
         };
         for (kind, recording) in recordings {
             if let Some(path) = plotted.filter(|_| !drawn) {
@@ -52,7 +55,7 @@ pub(crate) fn inspect(
             if as_json {
                 facts.push(as_value(&recording));
             } else {
-                output::answer(&in_words(&recording, kind))?;
+                output::answer(&in_words(&recording, kind, instrument))?;
             }
         }
     }
@@ -146,8 +149,8 @@ fn timing(t: &[f64]) -> (f64, f64, f64) {
     (t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0), middle, largest)
 }
 
-/// What a recording serves for, or what it lacks.
-fn uses(recording: &Recording, kind: Option<RunKind>) -> Vec<String> {
+/// What a recording serves for, or what it lacks; the instrument is what a campaign says.
+fn uses(recording: &Recording, kind: Option<RunKind>, instrument: Option<Instrument>) -> Vec<String> {
     let say = |kind: &str, asked: Result<(), ReadError>| match asked {
         Ok(()) => format!("serves as {kind}"),
         Err(ReadError::MissingColumns { needed, .. }) => format!("does not serve as {kind}: it needs {needed}"),
@@ -172,13 +175,16 @@ fn uses(recording: &Recording, kind: Option<RunKind>) -> Vec<String> {
     if !turns {
         out.push(say("a ring-down", recording.require_ringdown()));
     }
-    if recording.vas_v.is_none() || recording.vqc_v.is_none() {
+    let hint = instrument.is_none().then(|| doubts::looks_like_a_sensor(recording)).flatten();
+    let is_sensor = hint.is_some() || instrument == Some(Instrument::Sensor);
+    out.extend(hint);
+    if !is_sensor && (recording.vas_v.is_none() || recording.vqc_v.is_none()) {
         out.push("without vas_v and vqc_v the commands' share in the angle is not known".into());
     }
     out
 }
 
-fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
+fn in_words(recording: &Recording, kind: Option<RunKind>, instrument: Option<Instrument>) -> String {
     let mut s = String::new();
     let mut line = |text: String| {
         let _ = writeln!(s, "{text}");
@@ -208,16 +214,22 @@ fn in_words(recording: &Recording, kind: Option<RunKind>) -> String {
     let mut line = |text: String| {
         let _ = writeln!(s, "{text}");
     };
-    for u in uses(recording, kind) {
+    for u in uses(recording, kind, instrument) {
         line(format!("  {u}"));
     }
-    if recording.warnings.is_empty() && recording.len() > 1 {
+    let warnings = warnings(recording);
+    if warnings.is_empty() && recording.len() > 1 {
         line("  nothing is wrong with it".into());
     }
-    for w in &recording.warnings {
+    for w in warnings {
         line(format!("  warning: {w}"));
     }
     s
+}
+
+/// What is wrong with a recording: what was seen on reading it, and what no instrument could follow.
+fn warnings(recording: &Recording) -> Vec<String> {
+    recording.warnings.iter().cloned().chain(doubts::turns_too_far(recording)).collect()
 }
 
 pub(crate) fn as_value(recording: &Recording) -> Value {
@@ -232,7 +244,7 @@ pub(crate) fn as_value(recording: &Recording) -> Value {
         "largest_interval_s": largest_interval_s, "columns": columns,
         "unknown_columns": recording.unknown.iter().map(|u| u.name.as_str()).collect::<Vec<_>>(),
         "rotation": recording.require_rotation().is_ok() && !input::stands_still(recording), "ringdown": recording.require_ringdown().is_ok(),
-        "warnings": recording.warnings,
+        "warnings": warnings(recording),
     })
 }
 
