@@ -374,6 +374,19 @@ struct Asked {
     rates_alone: bool,
 }
 
+/// Why the sensor stays as it is.
+fn nothing_predicts(runs: &[SensorRun]) -> String {
+    let unit = runs.iter().find_map(of_the_angle).map_or(String::new(), |unit| format!("; wanted: {unit}"));
+    format!("nothing that was found predicts rows that were not fitted better than the sensor as it is{unit}")
+}
+
+/// Adds what goes with the temperature.
+fn add(hypothesis: &mut Hypothesis, thermal: &Thermal) {
+    hypothesis.reference_c = Some(thermal.reference_c());
+    hypothesis.members.extend(thermal.members());
+    hypothesis.members.sort_by_key(|m| m.id);
+}
+
 fn sensor_finding(
     asked: Asked,
     model: SensorModel,
@@ -416,18 +429,13 @@ fn sensor_finding(
     let mut hypothesis = described.hypothesis(sense);
     let neutral_hypothesis = Hypothesis { members: Vec::new(), angle_table: None, clip: None, ..hypothesis.clone() };
     if let Some(thermal) = thermal {
-        hypothesis.reference_c = Some(thermal.reference_c());
-        hypothesis.members.extend(thermal.members());
-        hypothesis.members.sort_by_key(|m| m.id);
+        add(&mut hypothesis, thermal);
     }
     warnings.extend(not_taken(texts, &hypothesis));
     Ok(Finding {
         instrument: Instrument::Sensor,
         stated_gain: stated,
-        reason: neutral.then(|| {
-            let unit = runs.iter().find_map(of_the_angle).map_or(String::new(), |unit| format!("; wanted: {unit}"));
-            format!("nothing that was found predicts rows that were not fitted better than the sensor as it is{unit}")
-        }),
+        reason: neutral.then(|| nothing_predicts(runs)),
         angular_gain: described.angular_gain(sense),
         detection_gain_ratio: gain_ratio,
         effects: with_the_interval(described.effects(), all)

@@ -81,15 +81,7 @@ pub(crate) fn serves(campaign: &Campaign) -> bool {
 pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
     require_one_unit(&campaign)?;
     let device = campaign.device.clone();
-    let provenance = Provenance {
-        tool: Some(Tool::default()),
-        inputs: provenance::sums(&provenance::files(&campaign)),
-        amplitude_v: provenance::amplitudes(&campaign),
-        readout_unit: provenance::readout_unit(&campaign),
-        covered_deg: None,
-        radius_left: None,
-        gain_unknown: campaign.pole_pairs.or(campaign.angular_gain).is_none(),
-    };
+    let provenance = provenance_of(&campaign);
     let period = campaign.period_deg.unwrap_or(360.0).to_radians();
     let stated = campaign.pole_pairs.or(campaign.angular_gain).unwrap_or(1.0);
     let runs = campaign.runs.into_iter().enumerate().map(|(i, r)| SensorRun::without_reference(r, i));
@@ -162,6 +154,19 @@ pub(crate) fn identify(campaign: Campaign) -> Result<Told, Refusal> {
         warnings,
         curve: Curve::new(&readout, &held),
     })
+}
+
+/// Which bytes the answer rests on, and what has to be known of them to use it.
+fn provenance_of(campaign: &Campaign) -> Provenance {
+    Provenance {
+        tool: Some(Tool::default()),
+        inputs: provenance::sums(&provenance::files(campaign)),
+        amplitude_v: provenance::amplitudes(campaign),
+        readout_unit: provenance::readout_unit(campaign),
+        covered_deg: None,
+        radius_left: None,
+        gain_unknown: campaign.pole_pairs.or(campaign.angular_gain).is_none(),
+    }
 }
 
 /// What is left of the radius, as shares of it.

@@ -31,14 +31,16 @@ pub(super) const COUNTS: [Unit; 15] = [
 ];
 
 /// Units that are taken for degrees.
-pub(super) const UNITS: [Unit; 8] = [
+pub(super) const UNITS: [Unit; 10] = [
     ("turns", 360.0),
     ("rad", 57.295_779_513),
     ("gon", 0.9),
+    ("tenths of a degree", 0.1),
     ("mrad", 0.057_295_779_513),
     // after those with a smaller turn, which theirs fills as well
     ("mils of 6400 a turn", 0.05625),
     ("arc minutes", 1.0 / 60.0),
+    ("hundredths of a degree", 0.01),
     ("mdeg", 1e-3),
     ("arc seconds", 1.0 / 3600.0),
 ];
@@ -229,6 +231,9 @@ mod tests {
         assert_eq!(said(12.0 * 57.295_78, false), Some((REFERENCE, "rad", 12.0)));
         assert_eq!(said(0.9, false), Some((REFERENCE, "gon", 1.0)));
         assert_eq!(said(1.0 / 60.0, true), Some((REFERENCE, "arc minutes", 1.0)));
+        // 24 periods in arc minutes and 10 in mdeg are more
+        assert_eq!(said(0.4, false), Some((REFERENCE, "tenths of a degree", 4.0)));
+        assert_eq!(said(0.01, false), Some((REFERENCE, "hundredths of a degree", 1.0)));
         assert_eq!(said(1.0 / 360.0, true), Some((ANGLE, "turns", 1.0)));
         assert_eq!(said(1.0 / 0.9, true), Some((ANGLE, "gon", 1.0)));
         assert_eq!(said(1.0 / 0.9, false), None);

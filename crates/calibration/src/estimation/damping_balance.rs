@@ -18,6 +18,8 @@ use crate::recording::Instrument;
 const LEAST_SHARE: f64 = 1e-3;
 /// The readout at 2θ.
 const READOUT: [EffectId; 2] = [EffectId::DetectionGainMismatch, EffectId::DetectionSkew];
+/// Anisodampings that differ by this share of the larger one are two: what the balance lacks of a readout at one amplitude makes a tenth.
+const ANOTHER: f64 = 0.5;
 /// An interval that covers what another witness says goes so many times as far as that: engineering choice.
 const COVERED: f64 = 1.2;
 /// Stretches that tell by their scatter how far the balance is off.
@@ -85,6 +87,16 @@ impl Dataset {
         told.map_or_else(Vec::new, |told| vec![prior(told, 0), prior(told, 1)])
     }
 
+    /// The same, by so much that no error of the balance makes it.
+    pub(crate) fn is_another_damping(&self, fitted: &Hypothesis) -> bool {
+        let (Some((told, _)), Some(member)) = (self.damping_balance, fitted.member(EffectId::Anisodamping)) else {
+            return false;
+        };
+        let [cos, sin] = [member.values[0], member.values[1]];
+        let apart = (cos - told[0]).hypot(sin - told[1]);
+        self.contradicts_the_damping(fitted) && apart > ANOTHER * cos.hypot(sin).max(told[0].hypot(told[1]))
+    }
+
     /// The covariance of a fit whose anisodamping is also what the energy loop had to put in, where the two contradict each other: something
     /// that goes against the rate turns the pattern at 2θ, as a spring or a drive that no effect describes.
     pub(crate) fn with_the_other_damping(&self, fit: &Fit, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
@@ -102,7 +114,7 @@ impl Dataset {
 
     /// What has to be said of an anisodamping that the energy loop contradicts.
     pub(crate) fn said_of_the_other_damping(&self, hypothesis: &Hypothesis) -> Option<String> {
-        let (told, _) = self.damping_balance.filter(|_| self.contradicts_the_damping(hypothesis))?;
+        let (told, _) = self.damping_balance.filter(|_| self.is_another_damping(hypothesis))?;
         let values = hypothesis.member(EffectId::Anisodamping)?.values;
         Some(format!(
             "the angle takes an anisodamping of {:.2e} 1/s, and the energy command has to replace one of {:.2e} 1/s: something else at 2θ turns the \

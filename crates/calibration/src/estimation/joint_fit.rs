@@ -433,7 +433,7 @@ fn prepared_run(track: Track, motion: Motion, instrument: Instrument) -> Prepare
 }
 
 /// The tracks of which some samples are fitted.
-pub(super) fn fitted_tracks(tracks: &[Prepared]) -> impl Iterator<Item = &Track> {
+pub(crate) fn fitted_tracks(tracks: &[Prepared]) -> impl Iterator<Item = &Track> {
     tracks.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0)
 }
 

@@ -46,9 +46,10 @@ impl Explained {
             (options.progress)("beginning anew without a rotation that does not agree");
             let before = left.iter().enumerate().filter(|(other, _)| other != at).filter_map(|(_, left)| *left);
             let before = mean(before);
-            let foreign = dataset.tracks.remove(*at);
+            let (foreign, said) = (dataset.tracks.remove(*at), dataset.warnings.len());
             let Ok(anew) = Self::from(dataset, paper, options) else {
                 dataset.tracks.insert(*at, foreign);
+                dataset.warnings.truncate(said);
                 continue;
             };
             let after = mean(of_each(dataset, &anew.fitted.fit).into_iter().flatten());
@@ -69,9 +70,10 @@ impl Explained {
                 return Ok(anew);
             }
             dataset.tracks.insert(*at, foreign);
+            dataset.warnings.truncate(said);
         }
-        // what a trial moved is as it was
-        if suspects.is_empty() { Ok(self) } else { Self::from(dataset, paper, options) }
+        dataset.restore(&self.fitted);
+        Ok(self)
     }
 }
 

@@ -58,6 +58,20 @@ pub(super) struct Found {
     pub(super) drives: Option<EffectReport>,
 }
 
+/// What nothing in the campaign tells, and what tells two things.
+fn said_of_what_is_open(inference: &Inference<'_>, angular_gain: Estimate) -> Vec<String> {
+    let Inference { dataset, fitted, .. } = inference;
+    let hypothesis = &fitted.fit.hypothesis;
+    let mut said: Vec<String> = inference.said_of_the_unbelieved().collect();
+    said.extend(unusual_gain(angular_gain.value, dataset.screen.stated(), dataset.instrument));
+    said.extend(inference.cubics_that_may_differ());
+    said.extend(said_of_the_damping(dataset, fitted));
+    said.extend(dataset.said_of_the_other_damping(hypothesis));
+    said.extend(said_of_the_quadrature(dataset, fitted));
+    said.extend(not_taken(&dataset.written, hypothesis));
+    said
+}
+
 impl Found {
     pub(super) fn report(
         self,
@@ -77,13 +91,7 @@ impl Found {
         warnings.extend(self.drives.as_ref().map(|_| CLIPPED_DRIVES.to_owned()));
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);
-        warnings.extend(inference.said_of_the_unbelieved());
-        warnings.extend(unusual_gain(angular_gain.value, dataset.screen.stated(), dataset.instrument));
-        warnings.extend(inference.cubics_that_may_differ());
-        warnings.extend(said_of_the_damping(dataset, fitted));
-        warnings.extend(dataset.said_of_the_other_damping(&fitted.fit.hypothesis));
-        warnings.extend(said_of_the_quadrature(dataset, fitted));
-        warnings.extend(not_taken(&dataset.written, &fitted.fit.hypothesis));
+        warnings.extend(said_of_what_is_open(&inference, angular_gain));
         let plots = with_plots.then(|| {
             let members = &fitted.fit.hypothesis.members;
             let told: Vec<usize> = (0..members.len()).filter(|&at| inference.identifiable(at, &members[at])).collect();

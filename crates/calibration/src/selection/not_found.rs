@@ -5,9 +5,10 @@
 use cvg_model::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
+use crate::data::track::Track;
 use crate::estimation::fit::{Fit, Prior, scaled_inverse};
 use crate::estimation::generalised_least_squares::linearised;
-use crate::estimation::joint_fit::{Dataset, Fitted};
+use crate::estimation::joint_fit::{Dataset, Fitted, fitted_tracks};
 use crate::estimation::normal::Normal;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::recording::Instrument;
@@ -19,6 +20,9 @@ use crate::selection::trial::extend;
 /// they put out either: engineering choices.
 const READOUT_ASKEW: f64 = 0.02;
 const DRIVES_ASKEW: f64 = 0.05;
+
+/// Runs that differ by more than this in speed tell the mechanics from the drives without the second order of the readout: engineering choice.
+const OTHER_SPEED: f64 = 2.0;
 
 /// Adds to the covariance of a fit's unknowns what the causes that the campaign could name, and did not, may have moved them by. Where all
 /// runs are at one rate, in one sense, no cause can be named: then it is what the drives, or the readout that points them, may turn the
@@ -49,9 +53,12 @@ fn askew(hypothesis: &Hypothesis) -> Vec<Candidate> {
     lacking(hypothesis, [EffectId::DetectionSkew, EffectId::ActuationSkew])
 }
 
-/// What may stand in the place of an effect that was found where all runs are at one amplitude: the same to first order, and not to second.
+/// What may stand in the place of an effect that was found where all runs are at one amplitude and about one speed: the same to first order,
+/// and not to second, by which such runs tell the anisodamping from the drives.
 fn rivals_at_one_amplitude(dataset: &Dataset, hypothesis: &Hypothesis) -> Vec<Candidate> {
-    if !dataset.alike().amplitude {
+    let speeds = || fitted_tracks(&dataset.tracks).map(Track::mean_speed);
+    let (slowest, fastest) = speeds().fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+    if !dataset.alike().amplitude || fastest > OTHER_SPEED * slowest {
         return Vec::new();
     }
     let found = hypothesis.members.iter().filter(|m| m.origin == Origin::Discovered);

@@ -72,7 +72,7 @@ fn held_out(dataset: &Dataset, state: &State) -> f64 {
 /// Takes its name from what turns the pattern against the rate, as anisodamping does, where the energy loop contradicts the anisodamping: what
 /// the angle took for that is of the same law as what was found, and none of the library has both.
 pub(crate) fn not_claimed_beside_another_damping(dataset: &Dataset, fitted: &mut Fitted, steps: &mut [Accepted]) {
-    if !dataset.contradicts_the_damping(&fitted.fit.hypothesis) {
+    if !dataset.is_another_damping(&fitted.fit.hypothesis) {
         return;
     }
     let law = EffectId::Anisodamping.description().scaling;
