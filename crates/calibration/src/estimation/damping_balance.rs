@@ -101,7 +101,7 @@ impl Dataset {
     /// that goes against the rate turns the pattern at 2θ, as a spring or a drive that no effect describes.
     pub(crate) fn with_the_other_damping(&self, fit: &Fit, mut covariance: DMatrix<f64>) -> DMatrix<f64> {
         let told = self.by_the_energy_loop(&fit.hypothesis);
-        if !self.contradicts_the_damping(&fit.hypothesis) {
+        if !self.is_another_damping(&fit.hypothesis) {
             return covariance;
         }
         let off =
