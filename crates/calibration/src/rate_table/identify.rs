@@ -52,6 +52,9 @@ pub(crate) fn identify(
         Explained { declared_fit, fitted, steps } = found.without_a_foreign_rotation(&mut dataset, &paper, options)?;
         if dataset.tracks.len() < rotations {
             covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+            if take_back_the_refuted(&mut dataset, &mut fitted, &mut steps)? {
+                covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+            }
         }
     }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
