@@ -357,21 +357,29 @@ fn one_odd_run_among_many_is_named_and_left_out() {
 /// of which nothing tells the odd one, the interval covers all.
 #[test]
 fn a_run_with_another_ratio_of_the_gains_is_left_out_or_covered() {
-    let made = |rates: &[f64]| {
+    let made = |rates: &[f64], times: f64| {
         let made = |(i, rate_dps): (usize, &f64)| Made { rate_dps: *rate_dps, seed: i as u64 + 1, ..Made::default() };
         let mut runs: Vec<Recording> = rates.iter().enumerate().map(|run| made(run).recording()).collect();
-        runs[2].yc_v.iter_mut().flatten().for_each(|v| *v *= 1.0025);
+        runs[2].yc_v.iter_mut().flatten().for_each(|v| *v *= times);
         identified(runs).unwrap().report
     };
-    let three = made(&[500.0, -400.0, 300.0]);
+    let three = made(&[500.0, -400.0, 300.0], 1.0025);
     let [low, high] = three.detection_gain_ratio.unwrap().ci95;
     assert!(low < RATIO && RATIO < high && high - low < 0.01, "{low} {high}: {:?}", three.warnings);
 
-    let four = made(&[500.0, -400.0, 300.0, -200.0]);
+    let four = made(&[500.0, -400.0, 300.0, -200.0], 1.0025);
     let [low, high] = four.detection_gain_ratio.unwrap().ci95;
     assert!(low < RATIO && RATIO < high && high - low < 0.01, "{low} {high}: {:?}", four.warnings);
     let is_left_out = |w: &String| w.starts_with("300dps-3.csv: left out") && w.contains("of another device");
     assert!(four.warnings.iter().any(is_left_out), "{:?}", four.warnings);
+
+    // too little to leave it out for
+    let near = made(&[500.0, -400.0, 300.0, -200.0], 1.0003);
+    let [low, high] = near.detection_gain_ratio.unwrap().ci95;
+    assert!(low < RATIO && RATIO < high && high - low < 0.01, "{low} {high}: {:?}", near.warnings);
+    let is_said =
+        |w: &String| w.contains("do not agree on the detection gain ratio") && w.contains("300dps-3.csv 1.01");
+    assert!(near.warnings.iter().any(is_said), "{:?}", near.warnings);
 }
 
 /// What the runs differ in is a damping that differs by axis, or they are of two instruments: nothing tells which.

@@ -59,6 +59,7 @@ fn what_the_held_out_runs_refute_is_taken_back() {
     let said = refuted.warnings.iter().find(|w| w.contains("taken back")).unwrap();
     assert!(said.contains("detection-offset"), "{said}");
     assert!(refuted.effects.iter().all(|e| e.id != "detection-offset"), "{:?}", refuted.effects);
+    assert!(refuted.runs.iter().all(|r| r.r#use != "left out"), "{:?}", refuted.warnings);
     // while an error of the held-out runs alone refutes nothing: it is there without the effects as well
     assert!(of(Role::Holdout).warnings.iter().all(|w| !w.contains("taken back")));
 }

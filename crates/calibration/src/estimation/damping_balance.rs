@@ -87,7 +87,7 @@ impl Dataset {
         told.map_or_else(Vec::new, |told| vec![prior(told, 0), prior(told, 1)])
     }
 
-    /// The same, by so much that no error of the balance makes it.
+    /// Whether the two contradict each other by so much that nothing which the balance lacks makes it.
     pub(crate) fn is_another_damping(&self, fitted: &Hypothesis) -> bool {
         let (Some((told, _)), Some(member)) = (self.damping_balance, fitted.member(EffectId::Anisodamping)) else {
             return false;

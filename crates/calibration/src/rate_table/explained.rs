@@ -10,6 +10,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::identified::Options;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
+use crate::rate_table::foreign::left_of_each;
 use crate::recording::Role;
 use crate::selection::discovery::discover;
 use crate::selection::step::Accepted;
@@ -42,7 +43,8 @@ pub(super) fn explained(
     if dataset.gives_a_run_up() {
         found = found.with_every_run_counted(dataset, paper, options)?;
     }
-    found = found.without_a_foreign_rotation(dataset, paper, options)?;
+    let left = left_of_each(dataset, &found.fitted.fit);
+    found = found.without_a_foreign_rotation(&left, dataset, paper, options)?;
     if dataset.without_foreign_ring_downs(&found.fitted.fit)? {
         (options.progress)("beginning anew without the ring-downs of another device");
         found = Explained::from(dataset, paper, options)?;

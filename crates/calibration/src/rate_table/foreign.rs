@@ -4,10 +4,10 @@
 //! that are in the others are lost. Left out, the others are explained, and what explains them leaves far more of it than of any of them.
 
 use crate::data::track::Track;
-use crate::diagnostics::evaluate::{Evaluation, evaluate};
+use crate::diagnostics::evaluate::evaluate;
 use crate::error::Refusal;
 use crate::estimation::fit::{Fit, Prepared};
-use crate::estimation::joint_fit::Dataset;
+use crate::estimation::joint_fit::{Dataset, fitted_tracks};
 use crate::estimation::residuals::Window;
 use crate::identified::Options;
 use crate::model::hypothesis::Hypothesis;
@@ -30,9 +30,11 @@ const EXPLAINED: f64 = 1.0 / 16.0;
 const FOREIGN: f64 = 25.0;
 
 impl Explained {
-    /// Begun anew without the rotation that keeps the others from being explained; this, where there is none.
+    /// Begun anew without the rotation that keeps the others from being explained; this, where there is none. With every rotation, all that they
+    /// ask for left `before` of each, whatever of it was taken back.
     pub(super) fn without_a_foreign_rotation(
         self,
+        before: &[Option<f64>],
         dataset: &mut Dataset,
         paper: &Hypothesis,
         options: &Options<'_>,
@@ -40,11 +42,10 @@ impl Explained {
         if !options.discover {
             return Ok(self);
         }
-        let left = of_each(dataset, &self.fitted.fit);
-        let suspects = suspects(dataset, &left);
+        let suspects = suspects(dataset, &left_of_each(dataset, &self.fitted.fit));
         for at in &suspects {
             (options.progress)("beginning anew without a rotation that does not agree");
-            let before = left.iter().enumerate().filter(|(other, _)| other != at).filter_map(|(_, left)| *left);
+            let before = before.iter().enumerate().filter(|(other, _)| other != at).filter_map(|(_, left)| *left);
             let before = mean(before);
             let (foreign, said) = (dataset.tracks.remove(*at), dataset.warnings.len());
             let Ok(anew) = Self::from(dataset, paper, options) else {
@@ -52,13 +53,15 @@ impl Explained {
                 dataset.warnings.truncate(said);
                 continue;
             };
-            let after = mean(of_each(dataset, &anew.fitted.fit).into_iter().flatten());
+            let after = mean(left_of_each(dataset, &anew.fitted.fit).into_iter().flatten());
             let starts = std::slice::from_ref(&foreign.starts);
             let hypothesis = &anew.fitted.fit.hypothesis;
             let own = evaluate(std::slice::from_ref(&foreign), hypothesis, starts, Role::Fit, Window::Whole, None);
             let own = own.mean_square();
-            let keeps_the_others = after < EXPLAINED * before || is_within(&foreign.track, &dataset.tracks);
-            if keeps_the_others && own > FOREIGN * after {
+            // one that is alone at its amplitude may show what no other does
+            let is_among = |of| is_among(&foreign.track, &dataset.tracks, of);
+            let stands_apart = after < EXPLAINED * before || is_among(Track::mean_speed);
+            if is_among(Track::mean_amplitude) && stands_apart && own > FOREIGN * after {
                 let degrees = |mean_square: f64| mean_square.sqrt().to_degrees();
                 let why = format!(
                     "what explains the other rotations to {:.4}° leaves {:.4}° of it: of another device, or something acted in it alone",
@@ -77,15 +80,11 @@ impl Explained {
     }
 }
 
-/// A rotation at a speed and an amplitude that others have, or have passed.
-fn is_within(track: &Track, others: &[Prepared]) -> bool {
-    let fitted = || others.iter().map(|p| &p.track).filter(|t| t.samples(Role::Fit) > 0);
-    let among = |of: fn(&Track) -> f64| {
-        let (own, (low, high)) =
-            (of(track), fitted().map(of).fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v))));
-        (low / (1.0 + ALIKE)..=high * (1.0 + ALIKE)).contains(&own)
-    };
-    among(Track::mean_speed) && among(Track::mean_amplitude)
+/// A rotation at a speed, or an amplitude, that other fitted ones have, or have on either side.
+fn is_among(track: &Track, others: &[Prepared], of: fn(&Track) -> f64) -> bool {
+    let ends = |(low, high): (f64, f64), v: f64| (low.min(v), high.max(v));
+    let (low, high) = fitted_tracks(others).map(of).fold((f64::INFINITY, 0.0), ends);
+    (low / (1.0 + ALIKE)..=high * (1.0 + ALIKE)).contains(&of(track))
 }
 
 /// The rotations of which most is left, where that is far beyond their noise.
@@ -105,15 +104,15 @@ fn suspects(dataset: &Dataset, left: &[Option<f64>]) -> Vec<usize> {
 }
 
 /// Mean square of what is left of each rotation that is fitted, rad².
-fn of_each(dataset: &Dataset, fit: &Fit) -> Vec<Option<f64>> {
+pub(super) fn left_of_each(dataset: &Dataset, fit: &Fit) -> Vec<Option<f64>> {
     let all = evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Whole, None);
-    let of = |track: usize, all: &Evaluation| {
+    let of = |track: usize| {
         let segments = all.segments.iter().zip(&all.kept).filter(|(s, _)| s.track == track);
         let kept = segments.flat_map(|(s, kept)| s.angle.iter().zip(kept).filter(|(_, kept)| **kept));
         let (sum, rows) = kept.fold((0.0, 0usize), |(sum, rows), (angle, _)| (sum + angle * angle, rows + 1));
         (rows > 0).then(|| sum / rows as f64)
     };
-    (0..dataset.tracks.len()).map(|track| of(track, &all)).collect()
+    (0..dataset.tracks.len()).map(of).collect()
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {

@@ -10,6 +10,7 @@ use crate::estimation::unknown_drives::with_unknown_drives;
 use crate::identified::{Identification, Options};
 use crate::rate_table::errors::Errors;
 use crate::rate_table::explained::{Explained, explained};
+use crate::rate_table::foreign::left_of_each;
 use crate::rate_table::report::{Found, Head};
 use crate::recording::Campaign;
 use crate::report::provenance;
@@ -43,13 +44,15 @@ pub(crate) fn identify(
     let Explained { mut declared_fit, mut fitted, mut steps } = explained(&mut dataset, &paper, options)?;
     (options.progress)("weighing by what the noise remembers");
     let mut covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
+    let left = left_of_each(&dataset, &fitted.fit);
     if take_back_the_refuted(&mut dataset, &mut fitted, &mut steps)? {
         (options.progress)("beginning anew without what the held-out run refutes");
         covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
         let rotations = dataset.tracks.len();
         let found = Explained { declared_fit, fitted, steps };
         // what the held-out run refutes may be what one rotation alone asked for
-        Explained { declared_fit, fitted, steps } = found.without_a_foreign_rotation(&mut dataset, &paper, options)?;
+        Explained { declared_fit, fitted, steps } =
+            found.without_a_foreign_rotation(&left, &mut dataset, &paper, options)?;
         if dataset.tracks.len() < rotations {
             covariance = last_step(&mut dataset, &mut fitted, &mut steps)?;
             if take_back_the_refuted(&mut dataset, &mut fitted, &mut steps)? {

@@ -1,5 +1,6 @@
 //! Which ways the input of a rotation turned.
 
+use crate::numerics::angles::wrapped;
 use crate::recording::{Run, RunKind};
 
 /// Parts of a run whose turns are counted one by one: a table that trembles turns neither way.
@@ -31,7 +32,7 @@ fn turned_deg(run: &Run) -> Vec<f64> {
     if let Some(table) = &r.table_deg {
         let mut last = f64::NAN;
         let by = |angle: &f64| {
-            let turned = (angle - last + 180.0).rem_euclid(360.0) - 180.0;
+            let turned = wrapped(angle - last, 360.0);
             last = if angle.is_finite() { *angle } else { last };
             if turned.is_finite() { turned } else { 0.0 }
         };

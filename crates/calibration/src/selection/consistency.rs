@@ -15,7 +15,7 @@ use crate::facts::Follows;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
 use crate::selection::candidates::Candidate;
-use crate::selection::step::{Accepted, State, member_of};
+use crate::selection::step::{Accepted, State, member_of, not_claimed};
 use crate::selection::trial::{Distinguishable, LEAST_GAIN, balance, validated};
 
 /// A run may show this much more or less of an effect than it should, beside what its noise allows.
@@ -117,9 +117,7 @@ pub(super) fn ask_every_run(dataset: &mut Dataset, fitted: &mut Fitted, steps: &
                 steps[own] = in_its_place(dataset, &fitted.fit, id, &steps[own]);
             }
             None => {
-                fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
-                steps[own].origin = Origin::Empirical;
-                steps[own].inconsistency = Some(why);
+                not_claimed(&mut fitted.fit.hypothesis, at, steps, &why);
             }
         }
         dataset.restore(fitted);

@@ -13,7 +13,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::{Origin, Unknown};
 use crate::recording::{Instrument, Role};
-use crate::selection::step::{Accepted, member_of, step_of};
+use crate::selection::step::{Accepted, member_of, not_claimed, step_of};
 use crate::selection::trial::LEAST_GAIN;
 use cvg_model::effects::Role as ParameterRole;
 
@@ -36,9 +36,7 @@ pub(crate) fn last_step(
         let Some(at) = member_of(&fitted.fit.hypothesis, own, steps) else { continue };
         let discovered = fitted.fit.hypothesis.members[at].origin == Origin::Discovered;
         if discovered && may_be_nothing(&fitted.fit, &covariance, at) {
-            fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
-            steps[own].origin = Origin::Empirical;
-            steps[own].inconsistency = Some("its interval holds zero".into());
+            not_claimed(&mut fitted.fit.hypothesis, at, steps, "its interval holds zero");
         }
     }
     Ok(covariance)

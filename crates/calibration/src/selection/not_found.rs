@@ -136,7 +136,7 @@ impl Models {
     }
 
     /// Unknowns of what was found in the place of these: its size is what it is if it is there, and that it may be the other is said.
-    fn found_as(&self, other: &[usize]) -> Vec<usize> {
+    fn found_in_their_place(&self, other: &[usize]) -> Vec<usize> {
         let members = &self.hypothesis.members;
         let member = |i: usize| match self.unknowns[i] {
             Unknown::Effect(member, _) => Some(members[member].id),
@@ -173,7 +173,8 @@ impl Models {
         let moved = &follow * mean_square * follow.transpose();
         let mut out = DMatrix::zeros(self.own.len(), self.own.len());
         let place: Vec<usize> = (0..self.own.len()).filter(|&i| !self.held[i]).collect();
-        let moves = |i: usize| !self.found_as(other).contains(&self.own[i]);
+        let found = self.found_in_their_place(other);
+        let moves = |i: usize| !found.contains(&self.own[i]);
         for (a, &i) in place.iter().enumerate().filter(|(_, i)| moves(**i)) {
             for (b, &j) in place.iter().enumerate().filter(|(_, j)| moves(**j)) {
                 out[(i, j)] = moved[(a, b)];

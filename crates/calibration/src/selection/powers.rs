@@ -2,11 +2,11 @@
 //! between two amplitudes, or over the sine of a channel, they follow X(1 + k|X|ᵖ) for any p. Where one such law explains as much with fewer
 //! parameters, they are not claimed.
 
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 use cvg_model::effects::{EffectId, harmonic_n};
 
-use super::step::{Accepted, step_of};
+use super::step::{Accepted, not_claimed};
 use super::trial::{LEAST_LEAD, REFUTED, balance, count, on_fit, sample_cost};
 use crate::error::Refusal;
 use crate::estimation::fit::Fit;
@@ -18,19 +18,18 @@ use crate::model::written::EffectText;
 const PAIR: [EffectId; 2] = [EffectId::DetectionCubic, EffectId::DetectionQuintic];
 const POWERS: [u32; 4] = [1, 3, 6, 8];
 
-/// The readout X(1 + k|X|ᵖ) of both channels.
-fn power(p: u32) -> Option<EffectId> {
-    static ADMITTED: OnceLock<Vec<Option<EffectId>>> = OnceLock::new();
-    let admit = |p: &u32| {
+/// The readout X(1 + k|X|ᵖ) of both channels, by its power.
+static OTHERS: LazyLock<Vec<(u32, EffectId)>> = LazyLock::new(|| {
+    let admitted = |p: u32| {
         let text = format!(
             "id = \"amplitude-to-the-{p}\"\nstage = \"readout\"\n[[parameter]]\nname = \"k\"\nunit = \"1/V^{p}\"\nscale = 1e-3\n\
              [map]\n\"x'\" = \"x * (1 + k * abs(x)^{p})\"\n\"y'\" = \"y * (1 + k * abs(y)^{p})\"\n"
         );
-        EffectText::parse(&text, "powers").and_then(|text| text.effect("powers")).ok()
+        let effect = EffectText::parse(&text, "powers").and_then(|text| text.effect("powers"));
+        effect.ok().map(|id| (p, id))
     };
-    let all = ADMITTED.get_or_init(|| POWERS.iter().map(admit).collect());
-    all[POWERS.iter().position(|q| *q == p)?]
-}
+    POWERS.into_iter().filter_map(admitted).collect()
+});
 
 /// Whether a fit leaves no more of the angle than another, by what the samples can tell, and the energy balance does not refute it. Both are
 /// looked at behind one scale of the noise, which each fit measures for itself.
@@ -67,7 +66,7 @@ pub(super) fn one_power_in_their_place(
     }
     let mut without = fitted.fit.hypothesis.clone();
     without.members.retain(|m| !is_one_of(m));
-    for (p, id) in POWERS.iter().filter_map(|p| Some((*p, power(*p)?))) {
+    for &(p, id) in OTHERS.iter() {
         let mut rival = without.clone();
         rival.admit(id, Origin::Discovered);
         let rival = fit_with_ring_downs(dataset, &rival)?;
@@ -76,15 +75,8 @@ pub(super) fn one_power_in_their_place(
         if !explains {
             continue;
         }
-        for at in claimed {
-            let step = step_of(&fitted.fit.hypothesis, at, steps);
-            fitted.fit.hypothesis.members[at].origin = Origin::Empirical;
-            if let Some(step) = step {
-                steps[step].origin = Origin::Empirical;
-                steps[step].inconsistency =
-                    Some(format!("X(1 + k|X|^{p}) by itself explains as much as it and what was found beside it"));
-            }
-        }
+        let why = format!("X(1 + k|X|^{p}) by itself explains as much as it and what was found beside it");
+        claimed.into_iter().for_each(|at| not_claimed(&mut fitted.fit.hypothesis, at, steps, &why));
         return Ok(());
     }
     Ok(())

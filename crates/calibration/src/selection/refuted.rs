@@ -12,7 +12,7 @@ use crate::estimation::joint_fit::{Dataset, Fitted, fit_with_ring_downs};
 use crate::estimation::residuals::Window;
 use crate::model::hypothesis::Origin;
 use crate::recording::Role;
-use crate::selection::step::{Accepted, State, step_of};
+use crate::selection::step::{Accepted, State, not_claimed, step_of};
 
 /// Effects are refuted where the held-out rms is this many times as large as it was before them. Less can be an accident of one
 /// run, and a choice between models that are nearly as good would make the held-out error one of the fit.
@@ -77,18 +77,11 @@ pub(crate) fn not_claimed_beside_another_damping(dataset: &Dataset, fitted: &mut
     }
     let law = EffectId::Anisodamping.description().scaling;
     for at in 0..fitted.fit.hypothesis.members.len() {
-        let step = step_of(&fitted.fit.hypothesis, at, steps);
-        let member = &mut fitted.fit.hypothesis.members[at];
+        let member = &fitted.fit.hypothesis.members[at];
         let d = member.id.description();
         if member.origin == Origin::Discovered && d.stage == Stage::Mechanics && d.scaling == law {
-            member.origin = Origin::Empirical;
-            if let Some(step) = step {
-                steps[step].origin = Origin::Empirical;
-                steps[step].inconsistency = Some(
-                    "the energy command contradicts what the angle takes for anisodamping, which is of the same law"
-                        .into(),
-                );
-            }
+            let why = "the energy command contradicts what the angle takes for anisodamping, which is of the same law";
+            not_claimed(&mut fitted.fit.hypothesis, at, steps, why);
         }
     }
 }

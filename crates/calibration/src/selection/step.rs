@@ -103,6 +103,16 @@ pub(crate) fn step_of(hypothesis: &Hypothesis, at: usize, steps: &[Accepted]) ->
     steps.iter().enumerate().filter(|(_, s)| s.id == id).nth(earlier).map(|(i, _)| i)
 }
 
+/// Takes its name from a member: it describes what it was found for, and another cause makes that. Its step says why.
+pub(super) fn not_claimed(hypothesis: &mut Hypothesis, at: usize, steps: &mut [Accepted], why: &str) {
+    let step = step_of(hypothesis, at, steps);
+    hypothesis.members[at].origin = Origin::Empirical;
+    if let Some(step) = step {
+        steps[step].origin = Origin::Empirical;
+        steps[step].inconsistency = Some(why.to_owned());
+    }
+}
+
 /// Which member a step brought in, the inverse of [`step_of`].
 pub(super) fn member_of(hypothesis: &Hypothesis, step: usize, steps: &[Accepted]) -> Option<usize> {
     (0..hypothesis.members.len()).find(|&at| step_of(hypothesis, at, steps) == Some(step))
