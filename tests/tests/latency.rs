@@ -48,3 +48,15 @@ fn a_late_output_leaves_the_angular_gain_alone_where_the_rate_swings() {
         assert!((latency.value - LATENCY_S).abs() < 1e-4, "seed {seed}: {latency:?}");
     }
 }
+
+/// Every run swings at one frequency: what is late goes with it, and was a line in time of 0.3 Hz.
+#[test]
+fn what_is_late_under_a_swing_alone_is_no_line_in_time() {
+    let w = TAU * 0.3;
+    let swing =
+        turning("swing.csv", |t| 300.0 * (w * t).sin(), |t| 300.0 / w * (1.0 - (w * t).cos()), &mut Noise::new(11));
+    let i = identified(Campaign { device: "made".into(), runs: vec![swing], ..Campaign::default() });
+    let latency = find(&i, "angle-latency").unwrap().parameters[0].clone();
+    assert!((latency.value - LATENCY_S).abs() < 1e-3, "{latency:?}");
+    assert!(find(&i, "time-periodic").is_none(), "{:?}", i.report.effects);
+}

@@ -35,3 +35,24 @@ pub(crate) fn no_help(heldout: &Heldout) -> String {
         heldout.discovered.rms_deg
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::no_better;
+    use crate::report::{ErrorSize, Heldout};
+
+    fn heldout(raw: f64, discovered: f64, noise_floor_deg: f64) -> Heldout {
+        let of = |rms_deg: f64| ErrorSize { rms_deg, peak_deg: 2.0 * rms_deg, peak_to_peak_deg: 4.0 * rms_deg };
+        Heldout { raw: Some(of(raw)), declared: of(discovered), discovered: of(discovered), noise_floor_deg }
+    }
+
+    #[test]
+    fn what_leaves_more_or_most_far_above_the_noise_is_of_no_use() {
+        let said = |raw, discovered, floor| no_better(&heldout(raw, discovered, floor), 5000);
+        assert!(said(0.3, 0.4, 0.1).is_some_and(|why| why.starts_with("nothing that was found helps")));
+        assert!(said(6.1, 4.2, 2e-5).is_some_and(|why| why.starts_with("what was found explains little")));
+        // an effect that no library has, and noise that hides most
+        assert_eq!(said(0.27, 0.2, 1e-3), None);
+        assert_eq!(said(6.1, 0.6, 2e-5), None);
+    }
+}

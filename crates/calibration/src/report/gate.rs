@@ -220,6 +220,15 @@ mod tests {
     use crate::report::ParameterReport;
 
     #[test]
+    fn a_gain_of_a_tenth_that_nobody_stated_is_said_with_the_unit_that_would_make_it_usual() {
+        let said = |k, stated, instrument| unusual_gain(k, stated, instrument);
+        assert!(said(0.078, None, Instrument::Gyroscope).is_some_and(|w| w.contains("ten times as large")));
+        assert_eq!(said(0.078, Some(0.08), Instrument::Gyroscope), None);
+        assert_eq!(said(0.78, None, Instrument::Gyroscope), None);
+        assert_eq!(said(0.078, None, Instrument::Sensor), None);
+    }
+
+    #[test]
     fn an_effect_of_which_nothing_possible_is_left_out_is_not_told() {
         let late = |origin, half: f64| EffectReport {
             id: "angle-latency".into(),

@@ -130,3 +130,21 @@ pub(crate) fn tell_apart(
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Left;
+
+    #[test]
+    fn a_run_of_which_far_more_is_left_than_of_the_usual_one_is_odd_unless_it_is_its_noise() {
+        let odd = |rms: &[f64], white: f64| -> Vec<usize> {
+            let all: Vec<Left> = rms.iter().enumerate().map(|(run, &rms)| Left { run, rms, white }).collect();
+            Left::odd(&all).map(|(left, _)| left.run).collect()
+        };
+        assert_eq!(odd(&[1e-5, 1.1e-5, 1e-3, 0.9e-5], 1e-5), [2]);
+        assert!(odd(&[1e-5, 1.1e-5, 4e-5, 0.9e-5], 1e-5).is_empty());
+        // a small amplitude has that much noise, and of two runs neither is the usual one
+        assert!(odd(&[1e-5, 1.1e-5, 1e-3, 0.9e-5], 5e-4).is_empty());
+        assert!(odd(&[1e-5, 1e-3], 1e-5).is_empty());
+    }
+}
