@@ -11,7 +11,7 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 23] = [
+const IDS: [&str; 25] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
@@ -22,6 +22,8 @@ const IDS: [&str; 23] = [
     "drive-feedthrough",
     "drive-saturation",
     "temperature",
+    "skew-temperature",
+    "scale-temperature",
     "actuation-gain-mismatch",
     "actuation-skew",
     "actuation-phase",

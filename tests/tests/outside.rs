@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use cvg_calibration::recording::Campaign;
-use cvg_calibration::{Identification, Law, Options, Origin, identify};
+use cvg_calibration::{EffectText, Identification, Law, Options, Origin, identify};
 use cvg_model::Envelope;
 use cvg_simulator::scenario::Run;
 use cvg_simulator::{Scenario, Settings, Simulated, SimulatedRun};
-use cvg_tests::bench::{found, identify_folder, over_floor, plain_paper, scenario, trials};
+use cvg_tests::bench::{all, effect, found, identify_folder, over_floor, plain_paper, scenario, trials};
 use tempfile::TempDir;
 
 /// Size of the errors, rad: some 20 times the noise.
@@ -407,6 +407,51 @@ fn a_product_of_the_channels_is_corrected_where_most_runs_agree() {
     is_left_unexplained(&identified, "pattern-harmonic", Some(1));
     is_left_unexplained(&identified, "pattern-harmonic", Some(3));
     is_corrected(&identified);
+}
+
+/// A gyroscope with one more effect in its loop, which has one parameter.
+fn with_one_more(number: u64, stage: &str, value: f64, map: &[(&str, &str)]) -> Settings {
+    let map: String = map.iter().map(|(key, of)| format!("\"{key}\" = \"{of}\"\n")).collect();
+    let text = format!(
+        "id = \"planted-{number}\"\nstage = \"{stage}\"\n[[parameter]]\nname = \"p\"\nunit = \"1\"\nscale = 1e-3\n[map]\n{map}"
+    );
+    let id = EffectText::parse(&text, "planted").unwrap().effect("planted").unwrap();
+    let mut settings = Settings { seed: number, ..plain_paper() };
+    settings.effects.push(effect(id, &[value]));
+    settings
+}
+
+/// Laws of which harmonics and formulas of the library are the sight: each is proposed as what it is, and nothing else is. Two of them
+/// always, all with CVG_TRIALS=7.
+#[test]
+fn one_law_is_proposed_in_the_place_of_what_it_looks_like() {
+    const OF_A_DEAD_ZONE: &str = "min(1, p / max(abs(x), 1e-9))";
+    let r = OF_A_DEAD_ZONE;
+    let x = format!("x * (1 - 2 / pi * (atan2({r}, sqrt(max(1 - {r}^2, 0))) + {r} * sqrt(max(1 - {r}^2, 0))))");
+    let y = x.replace('x', "y").replace("may(", "max(");
+    let x_and_y = |x: &'static str, y: &'static str| [("x'", x), ("y'", y)];
+    let kinds = [
+        ("abs(x)^6", "readout", 1.2e-3, x_and_y("x * (1 + p * abs(x)^6)", "y * (1 + p * abs(y)^6)")),
+        ("k * abs(x)^1)", "readout", 3e-3, x_and_y("x * (1 + p * abs(x))", "y * (1 + p * abs(y))")),
+        ("d / abs(x)", "readout", 1e-3, [("x'", &*x), ("y'", &*y)]),
+        ("s * abs(x)^2 * x", "readout", 2e-3, x_and_y("x", "y + p * abs(x)^2 * x")),
+        ("s * abs(x)^1 * x", "readout", 2e-3, x_and_y("x", "y + p * abs(x) * x")),
+        ("precession^2", "readout", 2e-5, [("theta'", "theta + p * precession^2 * sin(2 * theta + 0.7)"); 2]),
+        ("abs(cos(theta))", "mechanics", 8e-3, [("theta_rate", "p * abs(cos(theta))"); 2]),
+    ];
+    let outcomes = all(trials(2).min(7), |kind| {
+        let (expected, stage, value, map) = &kinds[usize::try_from(kind).unwrap()];
+        let map = if map[0] == map[1] { &map[..1] } else { &map[..] };
+        let folder = written(&scenario(with_one_more(kind, stage, *value, map)).simulate());
+        let identified = identify_folder(folder.path()).unwrap();
+        let maps: Vec<String> = identified.report.proposals.iter().map(|p| format!("{:?}", p.map)).collect();
+        let again = fed_back(&folder, &identified);
+        let named = [&identified, &again].map(|i| found(i, Origin::Discovered));
+        let floors = [&identified, &again].map(over_floor);
+        println!("{expected}: {named:?} {maps:?} {floors:.2?}");
+        maps.len() == 1 && maps[0].contains(expected) && named[1] == ["proposal-1"] && floors[1] <= CORRECTED
+    });
+    assert!(outcomes.iter().all(|told| *told), "{outcomes:?}");
 }
 
 /// What is proposed, fed back, corrects the angle: one kind always, all of them with CVG_TRIALS=7.

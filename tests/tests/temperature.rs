@@ -51,6 +51,31 @@ fn a_gain_that_follows_the_temperature_is_found_with_its_slope() {
     assert!(count(|o| o.1) <= few && count(|o| o.3) <= few, "intervals miss");
 }
 
+/// The skew and the angular gain follow it as well, each by itself.
+#[test]
+fn a_skew_or_an_angular_gain_that_follows_the_temperature_is_found_with_its_slope() {
+    for (id, share) in [(EffectId::SkewTemperature, 1.0), (EffectId::ScaleTemperature, 0.5)] {
+        let outcomes = all(trials(4), |seed| {
+            let (mut settings, slope) = device(100 + seed, false);
+            settings.effects.push(effect(id, &[share * slope]));
+            let identified = identify(settings).unwrap();
+            let told = identified.report.effects.iter().find(|e| e.id == id.to_string());
+            let told = told.and_then(|e| e.parameters[0].ci95);
+            let claimed = found(&identified, Origin::Discovered);
+            let described = found(&identified, Origin::Empirical);
+            let floors = over_floor(&identified);
+            println!("{id} {seed}: {:.4e} {told:?}, {claimed:?}, {described:?}, {floors:.2} floors", share * slope);
+            let held = told.is_some_and(|[low, high]| (low..=high).contains(&(share * slope)));
+            let gain_held = holds(&identified.report.angular_gain, 0.78);
+            (claimed == [id.to_string()] && described.is_empty() && floors < 1.3, held, gain_held)
+        });
+        let missed = |is: fn(&(bool, bool, bool)) -> bool| outcomes.iter().filter(|o| !is(o)).count();
+        let few = (outcomes.len() / 10).max(1);
+        assert_eq!(missed(|o| o.0), 0, "{id}: something else was claimed, or more than noise is left");
+        assert!(missed(|o| o.1) <= few && missed(|o| o.2) <= few, "{id}: intervals miss {outcomes:?}");
+    }
+}
+
 /// An afternoon in one room: the runs lie within half a kelvin of one another.
 #[test]
 fn a_gain_that_follows_half_a_kelvin_is_found() {

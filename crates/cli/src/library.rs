@@ -238,7 +238,15 @@ At one rate and one amplitude the following cannot be told apart:
 - `detection-skew`, and the cosine part of `anisodamping`;
 - `detection-cubic`, and `spring-cubic`;
 - the difference part of `detection-cubic`, and `detection-gain-mismatch`;
+- `detection-cubic`, and `detection-quintic`, which is reported as a cubic;
+- `detection-phase`, and `spring-cubic`, where v_qc and the quadrature were not recorded;
 - `drive-saturation`, and `spring-cubic`, where the commands were not recorded.
+
+At any rate and any amplitude neither can these:
+
+- `actuation-phase`, and `anisodamping`, where v_as was not recorded;
+- `drive-feedthrough`, and `detection-gain-mismatch` or `detection-skew`, without a ring-down, in which the drives are silent;
+- `temperature`, and `gain-drift`; `scale-temperature`, and `scale-drift`: where the temperature went with the time.
 
 What separates them is in [Prepare a campaign](campaigns.md). How an effect is added is in
 [Add an effect](adding-an-effect.md).

@@ -19,7 +19,7 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
         "detection-phase" => [0.4 * u, 0.0, 0.0, 0.0],
         "drive-feedthrough" => unit.map(|u| 0.1 * u),
         "detection-gain-mismatch" => [1.0 + 0.4 * u, 0.0, 0.0, 0.0],
-        "temperature" => [1e-3 * u, 0.0, 0.0, 0.0],
+        "temperature" | "skew-temperature" => [1e-3 * u, 0.0, 0.0, 0.0],
         "gain-drift" => [1e-3 * u, 0.0, 0.0, 0.0],
         "detection-offset" => [0.5 * u, 0.5 * v, 0.0, 0.0],
         // from no clipping to a carrier three times over the clip level

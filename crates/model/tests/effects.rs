@@ -81,6 +81,8 @@ fn linear_readouts_are_their_matrices_and_offsets() {
     reads(EffectId::Temperature, [0.05, 0.0, 0.0, 0.0], gain(1.25), 1e-15);
     let skewed = Envelope::new(x_c, x_s, y_c + 0.5 * x_c, y_s + 0.5 * x_s);
     reads(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0], skewed, 1e-15);
+    // 0.1/K · 5 K
+    reads(EffectId::SkewTemperature, [0.1, 0.0, 0.0, 0.0], skewed, 1e-15);
     let offset = Envelope::new(x_c + 0.1, x_s, y_c - 0.3, y_s);
     reads(EffectId::DetectionOffset, [0.1, -0.3, 0.0, 0.0], offset, 1e-15);
 }
@@ -207,6 +209,8 @@ fn the_input_rate_is_what_reaches_the_resonator() {
         );
         assert_abs_diff_eq!(rate(EffectId::RateOffset, [0.05, 0.0, 0.0, 0.0]), table + 0.05, epsilon = 1e-15);
         assert_abs_diff_eq!(rate(EffectId::ScaleDrift, [0.02, 0.0, 0.0, 0.0]), 1.05 * table, epsilon = 1e-15);
+        // 1 + 0.01/K · 5 K
+        assert_abs_diff_eq!(rate(EffectId::ScaleTemperature, [0.01, 0.0, 0.0, 0.0]), 1.05 * table, epsilon = 1e-15);
         assert_eq!(rate(EffectId::DetectionSkew, [0.5, 0.0, 0.0, 0.0]), table, "a readout leaves it");
     }
 }
@@ -400,6 +404,7 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-cubic",
         "detection-quintic",
         "detection-skew",
+        "skew-temperature",
         "detection-gain-mismatch",
         "gain-drift",
         "temperature",

@@ -292,6 +292,27 @@ fn temperature_is_a_sine_of_2_theta_in_proportion_to_it() {
 }
 
 #[test]
+fn skew_temperature_is_half_of_one_plus_a_cosine_of_2_theta_in_proportion_to_it() {
+    let effect = r#"{ id = "skew-temperature", skew_per_k = 1e-4 }"#;
+    for start_c in [45.0, 5.0] {
+        let keys = format!("temperature = {{ start_c = {start_c:?} }}");
+        let second = angle_harmonics(&rotation_with(&keys, effect, 500.0, 10.0), &[2.0])[0];
+        close(second.cos, 0.5e-4 * (start_c - 25.0));
+    }
+}
+
+#[test]
+fn scale_temperature_turns_the_pattern_further_in_proportion_to_it() {
+    let effect = r#"{ id = "scale-temperature", scale_per_k = 1e-4 }"#;
+    for start_c in [45.0, 5.0] {
+        let keys = format!("temperature = {{ start_c = {start_c:?} }}");
+        let run = rotation_with(&keys, effect, 200.0, 10.0);
+        let (lines, _) = fit(&angles(&run, Period::Pattern), &[column(&run, "t_s")], &[], &[]);
+        close(lines[0] + k_omega(200.0), -1e-4 * (start_c - 25.0) * k_omega(200.0));
+    }
+}
+
+#[test]
 fn time_periodic_is_a_line_in_time_at_any_rate() {
     for rate in [500.0, 200.0] {
         let run = rotation(r#"{ id = "time-periodic", frequency = 7.3, amplitude = 1e-3, phase = 50.0 }"#, rate, 10.0);

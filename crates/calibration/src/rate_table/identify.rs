@@ -17,6 +17,7 @@ use crate::report::provenance;
 use crate::report::recorded::run_report;
 use crate::selection::last_step::last_step;
 use crate::selection::not_found::with_what_was_not_found;
+use crate::selection::one_law::one_law;
 use crate::selection::refuted::{not_claimed_beside_another_damping, take_back_the_refuted};
 
 /// Identifies the instrument.
@@ -65,11 +66,14 @@ pub(crate) fn identify(
     let with_hidden = dataset.with_the_other_damping(&fitted.fit, with_hidden);
     not_claimed_beside_another_damping(&dataset, &mut fitted, &mut steps);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);
+    (options.progress)("looking for a law in what has no cause");
+    let law = options.discover.then(|| one_law(&mut dataset, &fitted)).transpose()?.flatten();
     (options.progress)("measuring the held-out error");
     let errors = Errors::of(&dataset, &declared_fit, &fitted.fit);
     let steps = steps.into_iter().map(|step| step.read(&dataset)).collect();
     let warnings = std::mem::take(&mut dataset.warnings);
     let drives = dataset.clipping.and_then(|_| clipping(&dataset, &fitted.fit.hypothesis)?.report());
-    let found = Found { dataset, declared_fit, fitted, covariance, with_hidden, steps, scale_factor, errors, drives };
+    let found =
+        Found { dataset, declared_fit, fitted, covariance, with_hidden, steps, law, scale_factor, errors, drives };
     found.report(head, warnings, with_plots)
 }

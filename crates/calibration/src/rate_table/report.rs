@@ -30,6 +30,7 @@ use crate::report::runs::tell_apart;
 use crate::report::stages::stages;
 use crate::report::unexplained::{LEFT_OVER, described, left_over, residual_report, unexplained};
 use crate::report::{EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Status, Temperature, Tool};
+use crate::selection::one_law::OneLaw;
 use crate::selection::step::Step;
 
 /// What the campaign says of itself, kept while its recordings are taken apart.
@@ -52,6 +53,8 @@ pub(super) struct Found {
     /// the same with what effects that were not found may have moved
     pub(super) with_hidden: DMatrix<f64>,
     pub(super) steps: Vec<Step>,
+    /// what explains by itself what has no cause
+    pub(super) law: Option<OneLaw>,
     pub(super) scale_factor: Option<ScaleFactor>,
     pub(super) errors: Errors,
     /// drives that clip, which the commands tell and the angle does not
@@ -98,7 +101,7 @@ impl Found {
             self.context(&told).plots()
         });
         let left = unexplained(dataset, &errors.on_fit, &errors.dense_on_fit, &errors.discovered, errors.noise_floor);
-        let proposals = proposals(dataset, &fitted.fit, &errors.on_fit, &channels_left, &left);
+        let proposals = proposals(dataset, &fitted.fit, &errors.on_fit, &channels_left, (&left, self.law.as_ref()));
         let mut unexplained = described(&fitted.fit.hypothesis, &self.steps);
         unexplained.extend(left);
         let facts = self.facts();

@@ -19,6 +19,7 @@ use crate::recording::Role;
 use crate::report::channels::amplitudes;
 use crate::report::laws::{Scaling, waves, whole};
 use crate::report::{ChannelReport, Unexplained};
+use crate::selection::one_law::OneLaw;
 
 /// A harmonic of a channel this many half intervals large shows.
 const SHOWS: f64 = 2.0;
@@ -41,24 +42,26 @@ struct FittedRuns<'a> {
     cost: f64,
 }
 
-/// A proposal for everything that is corrected without a cause, and for what is `left` and was not corrected.
+/// A proposal for everything that is corrected without a cause, and for what is `left` and was not corrected; where one law explains
+/// much of that by itself, it is proposed in the place of what it explains.
 pub(crate) fn proposals(
     dataset: &Dataset,
     fit: &Fit,
     on_fit: &Evaluation,
     channels: &[ChannelReport],
-    left: &[Unexplained],
+    (left, law): (&[Unexplained], Option<&OneLaw>),
 ) -> Vec<EffectText> {
     let members = &fit.hypothesis.members;
     let empirical = |m: &&Member| m.origin == Origin::Empirical;
-    if left.is_empty() && !members.iter().any(|m| empirical(&m)) {
+    if left.is_empty() && law.is_none() && !members.iter().any(|m| empirical(&m)) {
         return Vec::new();
     }
     let cost = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
     let runs = FittedRuns { dataset, fit, on_fit, channels, amplitudes: amplitudes(dataset, fit), cost };
-    let mut texts: Vec<EffectText> = Vec::new();
+    let is_explained = |at: usize| law.is_some_and(|law| law.explained.contains(&at));
+    let mut texts: Vec<EffectText> = law.map(|law| law.text.clone()).into_iter().collect();
     let mut harmonics: Vec<f64> = Vec::new();
-    for (at, m) in members.iter().enumerate().filter(|(_, m)| empirical(m)) {
+    for (at, m) in members.iter().enumerate().filter(|(at, m)| empirical(m) && !is_explained(*at)) {
         if m.id != EffectId::HarmonicN {
             texts.extend(runs.other(at, m));
         } else if !harmonics.contains(&m.values[0]) {

@@ -24,8 +24,8 @@ use crate::selection::step::{Accepted, State, member_of, step_of};
 use crate::selection::together::all_together;
 use crate::selection::trial::{
     BY_AMPLITUDE, Before, CAREFUL, Distinguishable, FINALISTS, LEAST_GAIN, LEAST_LEAD, LEAST_VALIDATED_GAIN,
-    NOTHING_LEFT, REFUTED, Trial, balance, count, extend_from, mean_square, on_fit, price, refit, sample_cost,
-    validated,
+    NOTHING_LEFT, REFUTED, Trial, balance, count, explains_as_much, extend_from, mean_square, on_fit, price, refit,
+    sample_cost, validated,
 };
 
 /// Most effects that are added.
@@ -123,17 +123,12 @@ fn look_again(dataset: &mut Dataset, fitted: &mut Fitted, steps: &mut [Accepted]
     Ok(())
 }
 
-/// Whether a fit explains the fitted samples no worse than another by what tells rivals apart, and under cross-validation within
-/// a standard error of their mean square, and the energy balance does not refute it.
+/// Whether a fit explains as much as another, and leaves no more under cross-validation, within a standard error of its mean square.
 fn explains_as_well(dataset: &Dataset, fitted: &Fitted, other: &Fitted) -> bool {
-    let balances = balance(dataset, &other.fit).zip(balance(dataset, &fitted.fit));
-    if balances.is_some_and(|(before, after)| after > REFUTED * before) {
-        return false;
-    }
     let worth = count(&fitted.fit) / sample_cost(&on_fit(dataset, &other.fit));
-    let lead = worth * (mean_square(&fitted.fit) / mean_square(&other.fit)).ln();
     let allowed = 1.0 + (2.0 / worth.max(1.0)).sqrt();
-    lead < LEAST_LEAD && validated(dataset, fitted) <= allowed * validated(dataset, other)
+    explains_as_much(dataset, &fitted.fit, &other.fit)
+        && validated(dataset, fitted) <= allowed * validated(dataset, other)
 }
 
 /// The best extension of a fitted hypothesis that earns its place; none where it would come in with an origin that is not wanted.
@@ -189,7 +184,7 @@ fn best_step(
 }
 
 /// Candidates refitted in full from where one step led, beside a base that was refitted as well, best first.
-fn tried_carefully(dataset: &Dataset, fitted: &Fitted, promises: &[Promise], base: &Fit) -> Vec<Trial> {
+pub(super) fn tried_carefully(dataset: &Dataset, fitted: &Fitted, promises: &[Promise], base: &Fit) -> Vec<Trial> {
     let careful = |p: &Promise| {
         let fit = refit(dataset, fitted, &p.hypothesis, CAREFUL);
         Trial { candidate: p.candidate.clone(), fit, gain: p.gain, balance: None, refuted: false }

@@ -5,6 +5,7 @@ pub(crate) mod consistency;
 pub(crate) mod discovery;
 pub(crate) mod last_step;
 pub(crate) mod not_found;
+pub(crate) mod one_law;
 mod one_step;
 mod pairs;
 mod powers;

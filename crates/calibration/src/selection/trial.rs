@@ -137,6 +137,18 @@ impl Before {
     }
 }
 
+/// Whether a fit leaves no more of the angle than another, by what the samples can tell, and the energy balance does not refute it. Both are
+/// looked at behind one scale of the noise, which each fit measures for itself.
+pub(super) fn explains_as_much(dataset: &Dataset, rival: &Fit, other: &Fit) -> bool {
+    let balances = balance(dataset, other).zip(balance(dataset, rival));
+    if balances.is_some_and(|(before, after)| after > REFUTED * before) {
+        return false;
+    }
+    let [left, other_left] = [rival, other].map(|fit| on_fit(dataset, fit));
+    let worth = count(other) / sample_cost(&other_left);
+    worth * (left.mean_square() / other_left.mean_square()).ln() < LEAST_LEAD
+}
+
 /// White part of the error, rad.
 pub(super) fn floor(dataset: &Dataset, fit: &Fit) -> f64 {
     evaluate(&dataset.tracks, &fit.hypothesis, &fit.starts, Role::Fit, Window::Dense, None).noise_floor()

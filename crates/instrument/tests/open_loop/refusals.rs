@@ -26,7 +26,10 @@ fn an_effect_of_a_recordings_clock_or_thermometer_is_refused_and_every_other_of_
         }
     }
     refused.sort_by_key(|id| id.description().id);
-    assert_eq!(refused, [EffectId::GainDrift, EffectId::Temperature, EffectId::TimePeriodic]);
+    assert_eq!(
+        refused,
+        [EffectId::GainDrift, EffectId::SkewTemperature, EffectId::Temperature, EffectId::TimePeriodic]
+    );
 }
 
 /// A setting, and what is changed there.

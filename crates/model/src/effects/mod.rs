@@ -30,6 +30,8 @@ pub mod gain_drift;
 pub mod harmonic_n;
 pub mod rate_offset;
 pub mod scale_drift;
+pub mod scale_temperature;
+pub mod skew_temperature;
 pub mod spring_cubic;
 pub mod table_harmonic;
 pub mod temperature;
@@ -558,6 +560,7 @@ library! {
     TableHarmonic => table_harmonic::TableHarmonic,
     RateOffset => rate_offset::RateOffset,
     ScaleDrift => scale_drift::ScaleDrift,
+    ScaleTemperature => scale_temperature::ScaleTemperature,
     Anisodamping => anisodamping::Anisodamping,
     Anisoelasticity => anisoelasticity::Anisoelasticity,
     SpringCubic => spring_cubic::SpringCubic,
@@ -571,6 +574,7 @@ library! {
     DetectionCubic => detection_cubic::DetectionCubic,
     DetectionQuintic => detection_quintic::DetectionQuintic,
     DetectionSkew => detection_skew::DetectionSkew,
+    SkewTemperature => skew_temperature::SkewTemperature,
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,
     Temperature => temperature::Temperature,

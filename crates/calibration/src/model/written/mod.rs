@@ -6,6 +6,7 @@
 
 pub(crate) mod export;
 mod language;
+pub(crate) mod laws;
 
 use std::collections::BTreeMap;
 use std::path::Path;
