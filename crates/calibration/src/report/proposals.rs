@@ -17,7 +17,7 @@ use crate::model::written::{EffectText, Law, ParameterText};
 use crate::numerics::statistics::line;
 use crate::recording::Role;
 use crate::report::channels::amplitudes;
-use crate::report::laws::{Scaling, waves, whole};
+use crate::report::laws::{Conditions, Scaling, waves, whole};
 use crate::report::{ChannelReport, Unexplained};
 use crate::selection::one_law::OneLaw;
 
@@ -37,7 +37,7 @@ struct FittedRuns<'a> {
     fit: &'a Fit,
     on_fit: &'a Evaluation,
     channels: &'a [ChannelReport],
-    amplitudes: Vec<f64>,
+    conditions: Vec<Conditions>,
     /// of what a sample is worth
     cost: f64,
 }
@@ -57,7 +57,7 @@ pub(crate) fn proposals(
         return Vec::new();
     }
     let cost = inflation(&autocorrelation(on_fit, WHITENESS_LAGS), on_fit.errors().count());
-    let runs = FittedRuns { dataset, fit, on_fit, channels, amplitudes: amplitudes(dataset, fit), cost };
+    let runs = FittedRuns { dataset, fit, on_fit, channels, conditions: conditions(dataset, fit), cost };
     let is_explained = |at: usize| law.is_some_and(|law| law.explained.contains(&at));
     let mut texts: Vec<EffectText> = law.map(|law| law.text.clone()).into_iter().collect();
     let mut harmonics: Vec<f64> = Vec::new();
@@ -85,6 +85,16 @@ pub(crate) fn proposals(
     out
 }
 
+/// In what each fitted segment was recorded.
+fn conditions(dataset: &Dataset, fit: &Fit) -> Vec<Conditions> {
+    let warmer = dataset.tracks.iter().flat_map(|p| {
+        let fitted = p.track.segments.iter().filter(|s| s.role == Role::Fit);
+        fitted.map(|s| s.range.clone().map(|i| p.track.warmer_k(i)).sum::<f64>() / s.range.len().max(1) as f64)
+    });
+    let of = |(amplitude, warmer_k)| Conditions { amplitude, warmer_k };
+    amplitudes(dataset, fit).into_iter().zip(warmer).map(of).collect()
+}
+
 /// A part of a harmonic that goes with the rate in one way: that of `scaling`, and its size.
 struct Part {
     scaling: f64,
@@ -101,7 +111,7 @@ impl FittedRuns<'_> {
     }
 
     fn scaling(&self, e: &Evaluation, of: Follows, n: f64, directions: bool) -> Scaling {
-        Scaling::of(&waves(e, of, n, self.cost, &self.amplitudes), directions)
+        Scaling::of(&waves(e, of, n, self.cost, &self.conditions), directions)
     }
 
     /// Channels in which a harmonic shows under the declared model.
@@ -340,8 +350,8 @@ impl FittedRuns<'_> {
     }
 
     fn usual_amplitude(&self) -> f64 {
-        let sum: f64 = self.amplitudes.iter().map(|a| a.ln()).sum();
-        (sum / self.amplitudes.len().max(1) as f64).exp()
+        let sum: f64 = self.conditions.iter().map(|c| c.amplitude.ln()).sum();
+        (sum / self.conditions.len().max(1) as f64).exp()
     }
 }
 

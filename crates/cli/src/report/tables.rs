@@ -453,7 +453,8 @@ fn proposals(h: &mut String, r: &Report) {
             let Some(law) = &p.law else { continue };
             let power = |of: &str, e: Option<[f64; 2]>| e.map(|[low, high]| format!("{of}^({low:.2} … {high:.2})"));
             let turns = law.turns_with_direction.filter(|t| *t).map(|_| "the direction".to_owned());
-            let goes = [power("rate", law.rate), power("amplitude", law.amplitude), turns];
+            let warmer = law.temperature.map(|[low, high]| format!("the temperature, by {low:.2e} … {high:.2e} 1/K"));
+            let goes = [power("rate", law.rate), power("amplitude", law.amplitude), warmer, turns];
             let goes: Vec<String> = goes.into_iter().flatten().collect();
             let stage = format!("{}: {}", law.stage, law.meaning);
             let size = format!("{:.5}", law.size_deg);

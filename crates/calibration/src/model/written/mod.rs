@@ -101,6 +101,9 @@ pub struct Law {
     /// 95 % interval of the exponent of the amplitude; absent where the runs have one
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub amplitude: Option<[f64; 2]>,
+    /// 95 % interval of its change per kelvin, relative to itself, 1/K; absent where the runs have one temperature
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<[f64; 2]>,
     /// it changes its sign with the direction; absent where the runs have one
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turns_with_direction: Option<bool>,
