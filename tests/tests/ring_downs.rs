@@ -285,6 +285,7 @@ fn ring_downs_that_agree_by_themselves_are_kept_beside_rotations_that_lack_an_ef
         amplitude: 1.0,
         energy_off_s: 4.0,
         duration_s: 14.0,
+        carrier_sample_hz: None,
     }));
     let identified = identified(recorded(settings)).unwrap();
     let warnings = &identified.report.warnings;

@@ -11,7 +11,7 @@ const ANGLE: &str = "`t_s` and one of (`xc_v` with `yc_v`, `theta_deg`, `x_v` wi
 const ROTATION: &str =
     "`t_s`, one of (`rate_dps`, `table_deg`) and one of (`xc_v` with `yc_v`, `theta_deg`, `x_v` with `y_v`)";
 const CHANNELS: &str = "`t_s`, `xc_v` and `yc_v`";
-const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`";
+const RINGDOWN: &str = "`t_s`, `xc_v`, `yc_v` and `vas_v`, or at the carrier `x_v`, `y_v`, `fx_v` and `fy_v`";
 const DECAY: &str = "`t_s` and one of (`xc_v` with `xs_v`, `yc_v` and `ys_v`; `x_v` with `y_v`)";
 const VIRTUAL: &str =
     "`t_s`, `xc_v`, `xs_v`, `yc_v`, `ys_v`, `vas_v` and `vqc_v`, and `virtual_dps` where there was any";
@@ -53,13 +53,17 @@ impl Recording {
         self.require_rotation()
     }
 
-    /// Whether the columns of a ring-down are there: `t_s`, `xc_v`, `yc_v`, `vas_v`.
+    /// Whether the columns of a ring-down are there: `t_s`, `xc_v`, `yc_v`, `vas_v`, or at the carrier `x_v` and `y_v` with the
+    /// forces `fx_v` and `fy_v` or with `vas_v`.
     ///
     /// # Errors
     /// [`ReadError::MissingColumns`] says what is needed and what is there.
     pub fn require_ringdown(&self) -> Result<(), ReadError> {
         let has = |channel| self.channel(channel).is_some();
-        let whole = has(Channel::Xc) && has(Channel::Yc) && has(Channel::Vas);
+        let forces = has(Channel::Fx) && has(Channel::Fy);
+        let vibrates = has(Channel::Xc) && has(Channel::Yc);
+        let at_the_carrier = has(Channel::X) && has(Channel::Y);
+        let whole = (vibrates && has(Channel::Vas)) || (at_the_carrier && (has(Channel::Vas) || forces));
         self.require(whole, "a ring-down", RINGDOWN)
     }
 

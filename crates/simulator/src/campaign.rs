@@ -350,6 +350,8 @@ enum CampaignRun<'a> {
         file: &'a str,
         angle_deg: f64,
         energy_off_s: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        raw: Option<Raw>,
     },
     Virtual {
         file: &'a str,
@@ -377,7 +379,7 @@ impl<'a> CampaignRun<'a> {
                 raw: Raw::of(run),
             },
             Run::Ringdown { file, angle_deg, energy_off_s, .. } => {
-                Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s }
+                Self::Ringdown { file, angle_deg: *angle_deg, energy_off_s: *energy_off_s, raw: Raw::of(run) }
             }
             Run::Virtual { file, settle_s, purpose, .. } => {
                 Self::Virtual { file, settle_s: *settle_s, purpose: *purpose }

@@ -1,7 +1,9 @@
 //! Recordings at the carrier: displacements at several points a period, as an oscilloscope or a camera saves them. The
 //! carrier is found, followed and demodulated, window by window, and what comes out is a recording of envelopes as any
-//! other. Nothing is held beside the columns that were read but the envelopes.
+//! other, with the outputs of the controllers where the forces were recorded. Nothing is held beside the columns that were read but
+//! the envelopes.
 
+mod forces;
 mod found;
 mod rails;
 mod windows;
@@ -30,9 +32,8 @@ pub(crate) fn demodulated(mut campaign: Campaign) -> Result<Campaign, Refusal> {
             continue;
         }
         let name = run.file.display().to_string();
-        let is_decay = run.kind == RunKind::Decay;
-        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz, is_decay)?;
-        run.recording = if is_decay { envelopes } else { in_phase(envelopes) };
+        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz, run.kind)?;
+        run.recording = if run.kind == RunKind::Decay { envelopes } else { in_phase(envelopes) };
     }
     Ok(campaign)
 }
@@ -43,6 +44,7 @@ pub(crate) struct Carrier<'a> {
     pub(crate) t_s: &'a [f64],
     pub(crate) x: &'a [f64],
     pub(crate) y: &'a [f64],
+    pub(crate) forces: Option<[&'a [f64]; 2]>,
 }
 
 impl Carrier<'_> {
@@ -53,13 +55,15 @@ impl Carrier<'_> {
     }
 }
 
-fn recording(r: Recording, name: &str, stated_hz: Option<f64>, is_decay: bool) -> Result<Recording, Refusal> {
+fn recording(r: Recording, name: &str, stated_hz: Option<f64>, kind: RunKind) -> Result<Recording, Refusal> {
     let (Some(x), Some(y)) = (&r.x_v, &r.y_v) else { return Ok(r) };
-    let carrier = Carrier { t_s: &r.t_s, x, y };
+    let forces = forces_of(&r);
+    let carrier = Carrier { t_s: &r.t_s, x, y, forces };
     let frequency_hz = found::frequency(carrier, name, stated_hz)?;
     let mut seen = windows::demodulate(carrier, frequency_hz);
     let rails = rails::Rails::of(carrier);
     // a decay goes on below its rails; a rotation that is held at them has nothing else
+    let is_decay = kind == RunKind::Decay;
     let flat = if is_decay { rails.leave_out(carrier, &mut seen) } else { 0 };
     if seen.len() < 2 && flat > 0 {
         return Err(Refusal::no_answer(name, rails.said(), "channels whose range is wider than the vibration"));
@@ -90,7 +94,15 @@ fn recording(r: Recording, name: &str, stated_hz: Option<f64>, is_decay: bool) -
             out.set_channel(channel, seen.iter().map(|w| mean(values, &w.rows, angle)).collect());
         }
     }
-    out.warnings.extend(remarks(&r, name, frequency_hz, &seen));
+    out.warnings.push(remark(&r, name, frequency_hz, &seen));
+    let said = if forces.is_none() {
+        forces_not_used(&r, name).into_iter().collect()
+    } else if is_decay {
+        forces::of_a_decay(&seen, name).into_iter().collect()
+    } else {
+        forces::put_into(&mut out, &seen, name, kind)
+    };
+    out.warnings.extend(said);
     if rails.are_reached() {
         let left_out =
             if is_decay { format!("{flat} windows with such rows are left out") } else { "they are used".into() };
@@ -107,20 +119,31 @@ fn mean(values: &[f64], rows: &Range<usize>, angle: bool) -> f64 {
     first + of.iter().map(relative).sum::<f64>() / of.len().max(1) as f64
 }
 
-fn remarks(r: &Recording, name: &str, frequency_hz: f64, seen: &[Window]) -> Vec<String> {
+/// The forces of both axes. Outputs of the controllers that are recorded themselves stand over them.
+fn forces_of(r: &Recording) -> Option<[&[f64]; 2]> {
+    let outputs = r.vas_v.is_some() || r.vqc_v.is_some();
+    Some([r.fx_v.as_deref()?, r.fy_v.as_deref()?]).filter(|_| !outputs)
+}
+
+/// Why forces that are there are not used.
+fn forces_not_used(r: &Recording, name: &str) -> Option<String> {
+    match (&r.fx_v, &r.fy_v) {
+        (None, None) => None,
+        (Some(_), Some(_)) => Some(format!("{name}: fx_v and fy_v are not used: vas_v or vqc_v is recorded itself")),
+        _ => Some(format!("{name}: one of fx_v and fy_v is there without the other and is not used")),
+    }
+}
+
+fn remark(r: &Recording, name: &str, frequency_hz: f64, seen: &[Window]) -> String {
     let rows: usize = seen.iter().map(|w| w.rows.len()).sum();
     let each = rows / seen.len().max(1);
     let length_s = (r.t_s[r.len() - 1] - r.t_s[0]) / seen.len() as f64;
-    let mut out = vec![format!(
+    format!(
         "{name}: demodulated at {frequency_hz:.6} Hz, {} envelopes of {each} rows each; what changes faster than {:.4} Hz \
          is not resolved",
         seen.len(),
         0.5 / length_s
-    )];
-    if r.fx_v.is_some() || r.fy_v.is_some() {
-        out.push(format!("{name}: the forces fx_v and fy_v are not used"));
-    }
-    out
+    )
 }
 
 /// Envelopes whose phase a loop would have nulled: each turned by the phase of its own orbit.

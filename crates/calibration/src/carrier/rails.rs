@@ -109,9 +109,10 @@ mod tests {
     fn windows_with_rows_at_a_rail_are_left_out() {
         let (x, y) = (decay(1e-9, 0.97), decay(1e-9, 2.0));
         let t: Vec<f64> = (0..x.len()).map(|i| 2e-5 * i as f64).collect();
-        let carrier = Carrier { t_s: &t, x: &x, y: &y };
+        let carrier = Carrier { t_s: &t, x: &x, y: &y, forces: None };
         let rails = Rails::of(carrier);
-        let window = |i: usize| Window { t_s: t[i], envelope: cvg_model::Envelope::zero(), rows: i..i + 100 };
+        let window =
+            |i: usize| Window { t_s: t[i], envelope: cvg_model::Envelope::zero(), forces: None, rows: i..i + 100 };
         let mut windows: Vec<Window> = (0..x.len()).step_by(100).map(window).collect();
         // 1 falls to 0.97 in ln(1/0.97)/5e-5 = 609 rows
         assert!((6..=7).contains(&rails.leave_out(carrier, &mut windows)));

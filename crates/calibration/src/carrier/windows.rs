@@ -19,6 +19,8 @@ pub(crate) struct Window {
     pub(crate) t_s: f64,
     /// relative to a reference of constant frequency
     pub(crate) envelope: Envelope<f64>,
+    /// of the forces, relative to the same reference; none where a force is missing
+    pub(crate) forces: Option<Envelope<f64>>,
     pub(crate) rows: Range<usize>,
 }
 
@@ -44,6 +46,8 @@ const ENOUGH_FITTED: f64 = 128.0;
 const FOLLOWED: f64 = 0.1;
 /// The furthest that the reference goes from where the carrier was found.
 const FURTHEST: f64 = 0.05;
+/// The smallest range of forces that the demodulator takes, V: of those that are nothing.
+const SMALLEST_RANGE: f64 = 1e-8;
 
 /// The envelopes of a carrier found at `frequency_hz`.
 pub(crate) fn demodulate(carrier: Carrier<'_>, frequency_hz: f64) -> Vec<Window> {
@@ -85,11 +89,14 @@ fn mixed(carrier: &Carrier<'_>, frequency_hz: f64, step_s: f64) -> Option<Vec<Wi
     let enough = (FEWEST_PERIODS / (frequency_hz * step_s)).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count, saturating")]
     let each = (enough as usize).max(FEWEST_ROWS).max(rows.div_ceil(MOST_WINDOWS)).min(MOST_ROWS);
-    let largest = carrier.x.iter().chain(carrier.y).fold(0.0, |m: f64, v| m.max(v.abs()));
     if rows / each < ENOUGH_MIXED {
         return None;
     }
-    let demodulator = Demodulator::<f64>::new(u16::try_from(each).ok()?, 2.0 * largest).ok()?;
+    let range = |[x, y]: [&[f64]; 2]| 2.0 * x.iter().chain(y).fold(0.0, |m: f64, v| m.max(v.abs()));
+    let samples = u16::try_from(each).ok()?;
+    let demodulator = Demodulator::<f64>::new(samples, range([carrier.x, carrier.y])).ok()?;
+    let of_forces = |f| Demodulator::<f64>::new(samples, range(f).max(SMALLEST_RANGE)).ok().map(|d| (d, f));
+    let forces = carrier.forces.and_then(of_forces);
     let limit_rad_s = (FURTHEST * std::f64::consts::TAU * frequency_hz).min(0.1 / step_s);
     let oscillator = Oscillator::<f64>::new(frequency_hz, step_s, limit_rad_s).ok()?;
     let mut follower = Follower { limit_rad_s, ..Follower::default() };
@@ -99,17 +106,25 @@ fn mixed(carrier: &Carrier<'_>, frequency_hz: f64, step_s: f64) -> Option<Vec<Wi
     let mut out = Vec::with_capacity(rows / each);
     for first in (0..rows - rows % each).step_by(each) {
         phasor = oscillator.tune(&phasor, follower.ahead_rad_s);
-        let mut window = Growing::begin(&phasor);
-        for i in first..first + each {
-            demodulator.accumulate(&mut window, carrier.x[i], carrier.y[i], &phasor);
-            phasor.advance();
-        }
+        let begin = phasor;
+        let mut grown = |demodulator: &Demodulator<f64>, [x, y]: [&[f64]; 2]| {
+            phasor = begin;
+            let mut window = Growing::begin(&phasor);
+            for (x, y) in x[first..first + each].iter().zip(&y[first..first + each]) {
+                demodulator.accumulate(&mut window, *x, *y, &phasor);
+                phasor.advance();
+            }
+            demodulator.envelope(&window, &phasor)
+        };
+        let pushed = forces.as_ref().and_then(|(demodulator, f)| grown(demodulator, *f));
+        let envelope = grown(&demodulator, [carrier.x, carrier.y])?;
         let middle_s = 0.5 * (each - 1) as f64 * step_s;
         let whole_s = each as f64 * step_s;
-        let envelope = demodulator.envelope(&window, &phasor)?;
+        let turn = ahead + follower.ahead_rad_s * middle_s;
         out.push(Window {
             t_s: carrier.t_s[0] + first as f64 * step_s + middle_s,
-            envelope: phased(&envelope, ahead + follower.ahead_rad_s * middle_s),
+            envelope: phased(&envelope, turn),
+            forces: pushed.map(|f| phased(&f, turn)),
             rows: first..first + each,
         });
         ahead += follower.ahead_rad_s * whole_s;
@@ -137,8 +152,9 @@ fn fitted(carrier: &Carrier<'_>, frequency_hz: f64, step_s: f64) -> Vec<Window> 
         let from_s = t[0] + k as f64 * step_s;
         let place = |at_s: f64| t.partition_point(|t| *t < at_s);
         let rows = place(from_s)..place(from_s + length_s);
-        if let Some(envelope) = least_squares(carrier, &rows, frequency_hz) {
-            out.push(Window { t_s: from_s + 0.5 * length_s, envelope, rows });
+        if let Some(envelope) = least_squares(t, [carrier.x, carrier.y], &rows, frequency_hz) {
+            let forces = carrier.forces.and_then(|f| least_squares(t, f, &rows, frequency_hz));
+            out.push(Window { t_s: from_s + 0.5 * length_s, envelope, forces, rows });
         }
     }
     out
@@ -149,18 +165,23 @@ fn reference(frequency_hz: f64, t_s: f64) -> f64 {
     std::f64::consts::TAU * (frequency_hz * t_s).fract()
 }
 
-/// o, x_c, x_s of both channels over some rows; the envelope changes evenly within a window, so that it is that of its middle.
-fn least_squares(carrier: &Carrier<'_>, rows: &Range<usize>, frequency_hz: f64) -> Option<Envelope<f64>> {
+/// o, x_c, x_s of two channels over some rows; the envelope changes evenly within a window, so that it is that of its middle.
+fn least_squares(
+    t_s: &[f64],
+    [of_x, of_y]: [&[f64]; 2],
+    rows: &Range<usize>,
+    frequency_hz: f64,
+) -> Option<Envelope<f64>> {
     if rows.len() < FEWEST_ROWS / 2 {
         return None;
     }
     let (mut matrix, mut x, mut y) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
     for i in rows.clone() {
-        let (sin, cos) = reference(frequency_hz, carrier.t_s[i] - carrier.t_s[0]).sin_cos();
+        let (sin, cos) = reference(frequency_hz, t_s[i] - t_s[0]).sin_cos();
         let row = Vector3::new(1.0, cos, sin);
         matrix += row * row.transpose();
-        x += row * carrier.x[i];
-        y += row * carrier.y[i];
+        x += row * of_x[i];
+        y += row * of_y[i];
     }
     let factors = matrix.cholesky()?;
     // a window whose rows do not cover the phases tells nothing
@@ -169,7 +190,8 @@ fn least_squares(carrier: &Carrier<'_>, rows: &Range<usize>, frequency_hz: f64) 
         return None;
     }
     let (x, y) = (factors.solve(&x), factors.solve(&y));
-    Some(Envelope::new(x[1], x[2], y[1], y[2]))
+    let envelope = Envelope::new(x[1], x[2], y[1], y[2]);
+    envelope.pendulum().e.is_finite().then_some(envelope)
 }
 
 #[cfg(test)]
@@ -203,24 +225,24 @@ mod tests {
     #[test]
     fn an_even_carrier_has_the_envelope_of_its_orbit() {
         let (t, x, y, orbit) = carrier((0..40_000).map(|i| f64::from(i) * 5e-6), 15_213.7);
-        same_orbit(&demodulate(Carrier { t_s: &t, x: &x, y: &y }, 15_213.0), &orbit, 1e-3);
+        same_orbit(&demodulate(Carrier { t_s: &t, x: &x, y: &y, forces: None }, 15_213.0), &orbit, 1e-3);
     }
 
     #[test]
     fn a_camera_that_stumbles_sees_the_same_orbit() {
         let jitter = |i: i32| 0.04 * f64::from(i) + 0.012 * (f64::from(i) * 12.9898).sin();
         let (t, x, y, orbit) = carrier((0..3000).map(jitter), 0.36);
-        same_orbit(&demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36), &orbit, 1e-9);
+        same_orbit(&demodulate(Carrier { t_s: &t, x: &x, y: &y, forces: None }, 0.36), &orbit, 1e-9);
     }
 
     #[test]
     fn a_short_film_of_few_frames_has_windows_enough() {
         let (t, x, y, orbit) = carrier((0..4500).map(|i| f64::from(i) * 0.04), 0.36);
-        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36);
+        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y, forces: None }, 0.36);
         assert!(windows.len() > 100, "{}", windows.len());
         same_orbit(&windows, &orbit, 1e-9);
         let (t, x, y, orbit) = carrier((0..7200).map(|i| f64::from(i) * 0.2), 0.36);
-        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y }, 0.36);
+        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y, forces: None }, 0.36);
         assert!(windows.len() > 200, "{}", windows.len());
         same_orbit(&windows, &orbit, 1e-9);
     }
@@ -228,7 +250,7 @@ mod tests {
     #[test]
     fn a_reference_that_is_a_little_off_follows_the_carrier() {
         let (t, x, y, _) = carrier((0..400_000).map(|i| f64::from(i) * 5e-6), 15_220.0);
-        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y }, 15_200.0);
+        let windows = demodulate(Carrier { t_s: &t, x: &x, y: &y, forces: None }, 15_200.0);
         // relative to the constant reference the envelope turns at the whole difference
         let (one, other) = (&windows[windows.len() - 2], &windows[windows.len() - 1]);
         let (z, w) = (one.envelope, other.envelope);

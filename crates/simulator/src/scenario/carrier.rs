@@ -30,13 +30,13 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
                 format!("{sample_hz} is no multiple of control_hz = {}", s.control_hz),
             ));
         }
+        if sample_hz > FASTEST_ELECTRONICS_HZ && !matches!(run, Run::Decay { .. }) {
+            return Err(ScenarioError::invalid(
+                field("carrier_sample_hz"),
+                format!("{sample_hz} is more than the {FASTEST_ELECTRONICS_HZ} of the fastest electronics"),
+            ));
+        }
         if let Run::Rotation { start_deg, reference, .. } = run {
-            if sample_hz > FASTEST_ELECTRONICS_HZ {
-                return Err(ScenarioError::invalid(
-                    field("carrier_sample_hz"),
-                    format!("{sample_hz} is more than the {FASTEST_ELECTRONICS_HZ} of the fastest electronics"),
-                ));
-            }
             if start_deg.is_some() {
                 return Err(ScenarioError::invalid(
                     field("start_deg"),

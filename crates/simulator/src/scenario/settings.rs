@@ -208,7 +208,7 @@ pub enum Run {
         /// angle of the pattern at the start, deg; random if not given
         #[serde(default, skip_serializing_if = "Option::is_none")]
         start_deg: Option<f64>,
-        /// the displacements themselves are recorded, `x_v` and `y_v`, at so many samples a second
+        /// displacements and forces themselves are recorded, `x_v`, `y_v`, `fx_v` and `fy_v`, at so many samples a second
         #[serde(default, skip_serializing_if = "Option::is_none")]
         carrier_sample_hz: Option<f64>,
     },
@@ -225,6 +225,9 @@ pub enum Run {
         /// set amplitude relative to `amplitude_v`
         #[serde(default = "defaults::one")]
         amplitude: f64,
+        /// displacements and forces themselves are recorded, `x_v`, `y_v`, `fx_v` and `fy_v`, at so many samples a second
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        carrier_sample_hz: Option<f64>,
     },
     /// no loops and no forces: the vibration rings freely
     Decay {
@@ -346,8 +349,10 @@ impl Run {
     /// Samples of the displacements a second, where these are recorded in the place of envelopes.
     pub fn carrier_sample_hz(&self) -> Option<f64> {
         match self {
-            Self::Rotation { carrier_sample_hz, .. } | Self::Decay { carrier_sample_hz, .. } => *carrier_sample_hz,
-            Self::Ringdown { .. } | Self::Virtual { .. } => None,
+            Self::Rotation { carrier_sample_hz, .. }
+            | Self::Ringdown { carrier_sample_hz, .. }
+            | Self::Decay { carrier_sample_hz, .. } => *carrier_sample_hz,
+            Self::Virtual { .. } => None,
         }
     }
 }
