@@ -29,7 +29,8 @@ pub fn identify_with_plots(campaign: Campaign, options: &Options<'_>) -> Result<
     run(campaign, options, true)
 }
 
-fn run(mut campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+fn run(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
+    let mut campaign = carrier::demodulated(campaign)?;
     let mut warnings = std::mem::take(&mut campaign.warnings);
     let copies = without_copies(&mut campaign, &mut warnings);
     let mut identified = without_doubles(campaign, options, with_plots)?;
@@ -41,7 +42,6 @@ fn run(mut campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Resul
 
 /// A campaign in which every recording is there once.
 fn without_doubles(campaign: Campaign, options: &Options<'_>, with_plots: bool) -> Result<Identification, Refusal> {
-    let campaign = carrier::demodulated(campaign)?;
     if free_decay::serves(&campaign) {
         let mut identified = free_decay::identify(campaign, options, with_plots)?;
         identified.report.warnings.extend(not_tried(&options.effects, "effects as text do not compete in free decays"));

@@ -53,6 +53,7 @@ mod virtual_precession;
 
 pub use angle_sensor::curve::Curve;
 pub use angle_sensor::likeness::hint as looks_like;
+pub use carrier::envelopes;
 pub use cvg_recording as recording;
 pub use diagnostics::allan;
 pub use diagnostics::plots;

@@ -3,6 +3,7 @@
 
 use crate::angle_sensor::curve::Curve;
 use crate::angle_sensor::{likeness, reference_free};
+use crate::carrier;
 use crate::diagnostics::at_rest;
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
@@ -57,7 +58,9 @@ pub fn answer(campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refus
     Ok(answer)
 }
 
-fn told(mut campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
+fn told(campaign: Campaign, options: &Options<'_>) -> Result<Answer, Refusal> {
+    // first of all: what looks at the rows of a recording copies them
+    let mut campaign = carrier::demodulated(campaign)?;
     if virtual_precession::serves(&campaign) {
         let mut surveyed = virtual_precession::identify(&campaign, options)?;
         surveyed

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use cvg_calibration::recording::{Campaign, Channel, Instrument, Naming, ReadError, Recording, Role, mapped_name};
+use cvg_calibration::envelopes;
+use cvg_calibration::recording::{
+    Campaign, Channel, Instrument, Naming, ReadError, Recording, Role, RunKind, Said, mapped_name,
+};
 
 use crate::{Failure, report_keys};
 
@@ -140,14 +143,18 @@ fn opened(names: &[PathBuf], wanted: &Wanted<'_>) -> Result<Campaign, Failure> {
                 file.display()
             )));
         }
-        return Campaign::open_as(file, naming, instrument).map_err(explained);
+        return Campaign::open_made(file, naming, instrument, envelopes).map_err(explained);
     }
     if let Some(file) = held.iter().find(|p| fitted.contains(p)) {
         return Err(Failure::input(format!("{}: cannot be fitted to and held out at once", file.display())));
     }
     let settle_s = settle_s.unwrap_or(0.0);
-    let read: Vec<Recording> =
-        fitted.iter().chain(&held).map(|path| recording(path, naming)).collect::<Result<_, _>>()?;
+    let made = |path: &PathBuf| {
+        let file = path.file_name().map_or(path.as_path(), Path::new);
+        let said = Said { file, kind: RunKind::Rotation, carrier_hz: None };
+        Ok(envelopes(recording(path, naming)?, said))
+    };
+    let read: Vec<Recording> = fitted.iter().chain(&held).map(made).collect::<Result<_, Failure>>()?;
     of_recordings(read, fitted.len(), settle_s, instrument)
 }
 

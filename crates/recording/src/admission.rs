@@ -9,6 +9,7 @@ use super::Recording;
 use super::channel::Channel;
 use super::dropped::{Dropped, Tally};
 use super::error::{Place, ReadError};
+use super::memory;
 use super::naming::Naming;
 use super::requirement;
 use super::table::{NumberColumn, Table};
@@ -158,6 +159,9 @@ impl Taken {
 
 /// Puts the integral over time, from zero on, in the place of rates that are mapped to an angle.
 fn integrate(table: &mut Table, naming: &Naming, warnings: &mut Vec<String>) {
+    if !table.numbers.iter().any(|column| naming.is_integral(column.channel)) {
+        return;
+    }
     let time = table.numbers.iter().find(|column| column.channel == Channel::Time).map(|column| column.values.clone());
     for column in table.numbers.iter_mut().filter(|column| naming.is_integral(column.channel)) {
         let mut angle = 0.0;
@@ -217,6 +221,8 @@ fn rows_to_keep(table: &Table, source: &Path, dropped: &mut Dropped) -> Result<O
     if needed.is_empty() && time.is_sorted_by(|before, after| before < after) {
         return Ok(None);
     }
+    // a number beside every row
+    memory::allow_columns(table.numbers.len() + 1, table.rows, "the recording with its dirt", source)?;
     let mut kept: Vec<usize> = Vec::with_capacity(table.rows);
     for (row, &t_s) in time.iter().enumerate() {
         if needed.iter().any(|values| values[row].is_nan()) {

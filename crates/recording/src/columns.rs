@@ -65,8 +65,7 @@ impl Recording {
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let layout = Layout::new(&names, naming, source)?;
         let rows = columns.first().map_or(0, |(_, values)| values.len());
-        let bytes = rows.saturating_mul(columns.len()).saturating_mul(size_of::<f64>());
-        memory::allow(bytes as u64, "the columns", source)?;
+        memory::allow_columns(columns.len(), rows, "the columns", source)?;
         let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
         table.warnings = warnings;
         table.rows = rows;

@@ -34,7 +34,7 @@ mod utf_16;
 
 use std::path::PathBuf;
 
-pub use campaign::{Campaign, Instrument, Reference, Role, Run, RunKind, stem};
+pub use campaign::{Campaign, Instrument, Reference, Role, Run, RunKind, Said, stem};
 pub use channel::Channel;
 pub use columns::Values;
 pub use dropped::{Dropped, Tally};

@@ -20,6 +20,8 @@ const UNSET: u64 = 0;
 const USUAL_MACHINE: u64 = 4 << 30;
 /// Bytes that a number takes while a column is read: as stored, converted, and within its column.
 pub(crate) const PER_NUMBER: u64 = 24;
+/// … and once it is there.
+const HELD: u64 = 8;
 /// Bytes that a cell of an unknown column takes, which is kept as text.
 pub(crate) const PER_TEXT: u64 = 48;
 
@@ -59,6 +61,11 @@ pub(crate) fn allow(needed: u64, what: &str, source: &Path) -> Result<(), ReadEr
         return Ok(());
     }
     Err(ReadError::TooLarge { path: source.to_path_buf(), what: what.to_owned(), needed, allowed })
+}
+
+/// Refuses so many columns of numbers that would take more than is allowed once they are there.
+pub(crate) fn allow_columns(columns: usize, rows: usize, what: &str, source: &Path) -> Result<(), ReadError> {
+    allow((columns as u64).saturating_mul(rows as u64).saturating_mul(HELD), what, source)
 }
 
 thread_local! {

@@ -66,8 +66,6 @@ impl Number {
 
 /// Bytes that are read at a time, or a row.
 const BLOCK: usize = 1 << 18;
-/// Bytes that a number takes once it is in its column.
-const HELD: u64 = 8;
 
 /// Reads a recording.
 pub(super) fn read(path: &Path, raw: &Raw, naming: &Naming) -> Result<Recording, ReadError> {
@@ -83,7 +81,7 @@ pub(super) fn read(path: &Path, raw: &Raw, naming: &Naming) -> Result<Recording,
     let layout = Layout::new(&names, naming, path)?;
     let row_bytes = (raw.number.bytes() * raw.columns.len()).max(1);
     let rows = usize::try_from(metadata.len()).unwrap_or(usize::MAX) / row_bytes;
-    memory::allow((rows as u64).saturating_mul(HELD * names.len() as u64), "the file", path)?;
+    memory::allow_columns(names.len(), rows, "the file", path)?;
 
     let mut table = Table::new(&layout, Place::Row(0), Places::Rows);
     let left_out = raw.columns.iter().enumerate().filter(|(at, _)| !kept.contains(at));

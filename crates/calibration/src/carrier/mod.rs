@@ -14,12 +14,23 @@ use cvg_model::Envelope;
 
 use crate::error::Refusal;
 use crate::numerics::angles::wrapped;
-use crate::recording::{Campaign, Channel, Recording, RunKind};
+use crate::recording::{Campaign, Channel, Recording, RunKind, Said};
 use windows::Window;
 pub(crate) use windows::phased;
 
 /// Windows that a recording is divided into at most.
 pub(crate) const MOST_WINDOWS: usize = 12_000;
+
+/// What is identified of a recording at the carrier: its envelopes. Any other is given back as it is, and so is one without a carrier,
+/// which [`crate::answer()`] refuses then.
+#[must_use]
+pub fn envelopes(recording: Recording, said: Said<'_>) -> Recording {
+    let name = said.file.display().to_string();
+    match seen(&recording, &name, said.carrier_hz, said.kind) {
+        Ok(Some(envelopes)) => envelopes,
+        _ => recording,
+    }
+}
 
 /// A campaign whose carrier-level recordings are demodulated.
 ///
@@ -27,13 +38,10 @@ pub(crate) const MOST_WINDOWS: usize = 12_000;
 /// A recording in which there is no carrier, or too few points of one.
 pub(crate) fn demodulated(mut campaign: Campaign) -> Result<Campaign, Refusal> {
     for run in &mut campaign.runs {
-        let r = &run.recording;
-        if r.xc_v.is_some() || r.theta_deg.is_some() || r.x_v.is_none() || r.y_v.is_none() {
-            continue;
-        }
         let name = run.file.display().to_string();
-        let envelopes = recording(std::mem::take(&mut run.recording), &name, campaign.carrier_hz, run.kind)?;
-        run.recording = if run.kind == RunKind::Decay { envelopes } else { in_phase(envelopes) };
+        if let Some(envelopes) = seen(&run.recording, &name, campaign.carrier_hz, run.kind)? {
+            run.recording = envelopes;
+        }
     }
     Ok(campaign)
 }
@@ -55,9 +63,21 @@ impl Carrier<'_> {
     }
 }
 
-fn recording(r: Recording, name: &str, stated_hz: Option<f64>, kind: RunKind) -> Result<Recording, Refusal> {
-    let (Some(x), Some(y)) = (&r.x_v, &r.y_v) else { return Ok(r) };
-    let forces = forces_of(&r);
+/// The envelopes of a recording; none where it is not at the carrier.
+fn seen(r: &Recording, name: &str, stated_hz: Option<f64>, kind: RunKind) -> Result<Option<Recording>, Refusal> {
+    let (Some(x), Some(y), None, None) = (&r.x_v, &r.y_v, &r.xc_v, &r.theta_deg) else { return Ok(None) };
+    let envelopes = recording(r, [x, y], name, stated_hz, kind)?;
+    Ok(Some(if kind == RunKind::Decay { envelopes } else { in_phase(envelopes) }))
+}
+
+fn recording(
+    r: &Recording,
+    [x, y]: [&[f64]; 2],
+    name: &str,
+    stated_hz: Option<f64>,
+    kind: RunKind,
+) -> Result<Recording, Refusal> {
+    let forces = forces_of(r);
     let carrier = Carrier { t_s: &r.t_s, x, y, forces };
     let frequency_hz = found::frequency(carrier, name, stated_hz)?;
     let mut seen = windows::demodulate(carrier, frequency_hz);
@@ -94,9 +114,9 @@ fn recording(r: Recording, name: &str, stated_hz: Option<f64>, kind: RunKind) ->
             out.set_channel(channel, seen.iter().map(|w| mean(values, &w.rows, angle)).collect());
         }
     }
-    out.warnings.push(remark(&r, name, frequency_hz, &seen));
+    out.warnings.push(remark(r, name, frequency_hz, &seen));
     let said = if forces.is_none() {
-        forces_not_used(&r, name).into_iter().collect()
+        forces_not_used(r, name).into_iter().collect()
     } else if is_decay {
         forces::of_a_decay(&seen, name).into_iter().collect()
     } else {

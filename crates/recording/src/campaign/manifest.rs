@@ -10,7 +10,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Instrument, Reference, Role, RunKind};
 use crate::Recording;
+use crate::channel::Channel;
 use crate::error::ReadError;
+use crate::memory;
 use crate::naming::Naming;
 use crate::raw::{Number, Raw};
 
@@ -78,15 +80,21 @@ pub(super) fn ringdown_of_a_sensor(path: &Path, at: Position) -> ReadError {
 impl Entry {
     /// Gives a recording without a reference of its own the constant rate that the campaign file states; says so where it
     /// has one and keeps it.
-    pub(super) fn constant_rate(&self, recording: &mut Recording) -> Option<String> {
-        let rate_dps = self.rate_dps?;
+    ///
+    /// # Errors
+    /// Where a column more is more than is allowed.
+    pub(super) fn constant_rate(&self, recording: &mut Recording) -> Result<Option<String>, ReadError> {
+        let Some(rate_dps) = self.rate_dps else { return Ok(None) };
         if recording.rate_dps.is_some() || recording.table_deg.is_some() {
             let own = if recording.table_deg.is_some() { "table_deg" } else { "rate_dps" };
             let file = self.file.display();
-            return Some(format!("{file}: has {own} itself; `rate_dps = {rate_dps}` of the campaign file is not used"));
+            let said = format!("{file}: has {own} itself; `rate_dps = {rate_dps}` of the campaign file is not used");
+            return Ok(Some(said));
         }
+        let columns = Channel::ALL.into_iter().filter(|channel| recording.channel(*channel).is_some()).count();
+        memory::allow_columns(columns + 1, recording.len(), "the recording with its rate", &recording.source)?;
         recording.rate_dps = Some(vec![rate_dps; recording.len()]);
-        None
+        Ok(None)
     }
 }
 

@@ -129,6 +129,17 @@ impl Run {
     }
 }
 
+/// What a campaign says of a recording that has just been read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Said<'a> {
+    /// Its file as the campaign names it.
+    pub file: &'a Path,
+    /// What was done.
+    pub kind: RunKind,
+    /// Frequency of the carrier, Hz, where it is stated.
+    pub carrier_hz: Option<f64>,
+}
+
 /// The runs made with one instrument.
 #[derive(Debug, Clone, Default)]
 pub struct Campaign {
@@ -183,12 +194,28 @@ impl Campaign {
     /// # Errors
     /// As [`Campaign::open_named`], and where a sensor has a ring-down.
     pub fn open_as(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
+        Self::open_made(path, naming, instrument, |recording, _| recording)
+    }
+
+    /// [`Campaign::open_as`] with something else made of each recording before the next is read, and before a constant rate is put
+    /// beside it: what is held at once is then one recording as it was read, and what was made of the others.
+    ///
+    /// # Errors
+    /// As [`Campaign::open_as`].
+    pub fn open_made(
+        path: &Path,
+        naming: &Naming,
+        instrument: Option<Instrument>,
+        mut made: impl FnMut(Recording, Said<'_>) -> Recording,
+    ) -> Result<Self, ReadError> {
         let is_manifest = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
         if is_manifest {
-            Self::open_manifest(path, naming, instrument)
-        } else {
-            Self::of_recordings_as(vec![Recording::read_named(path, naming)?], instrument.unwrap_or_default())
+            return Self::open_manifest(path, naming, instrument, made);
         }
+        let recording = Recording::read_named(path, naming)?;
+        let file = path.file_name().map_or(path, Path::new);
+        let recording = made(recording, Said { file, kind: RunKind::Rotation, carrier_hz: None });
+        Self::of_recordings_as(vec![recording], instrument.unwrap_or_default())
     }
 
     /// A campaign of rotation runs that has no campaign file: all are fitted to, none is given a time to settle. It is
@@ -245,12 +272,22 @@ impl Campaign {
         manifest::parse(&text::bytes_of(path).map_err(io)?, path)
     }
 
-    fn open_manifest(path: &Path, naming: &Naming, instrument: Option<Instrument>) -> Result<Self, ReadError> {
-        let read = |entry: &Entry, file: &Path, naming: &Naming| match &entry.raw {
-            Some(raw) => raw::read(file, raw, naming),
-            None => Recording::read_named(file, naming),
+    fn open_manifest(
+        path: &Path,
+        naming: &Naming,
+        instrument: Option<Instrument>,
+        mut made: impl FnMut(Recording, Said<'_>) -> Recording,
+    ) -> Result<Self, ReadError> {
+        let manifest = Self::manifest(path)?;
+        let carrier_hz = manifest.carrier_hz;
+        let read = |entry: &Entry, file: &Path, naming: &Naming| {
+            let recording = match &entry.raw {
+                Some(raw) => raw::read(file, raw, naming)?,
+                None => Recording::read_named(file, naming)?,
+            };
+            Ok(made(recording, Said { file: &entry.file, kind: entry.kind, carrier_hz }))
         };
-        Self::assembled(Self::manifest(path)?, path, naming, instrument, read)
+        Self::assembled(manifest, path, naming, instrument, read)
     }
 
     /// The campaign of a campaign file's text, its recordings given by `read`, which is asked for each by the path that the
@@ -286,7 +323,7 @@ impl Campaign {
             let file = folder.join(&entry.file);
             let mut recording =
                 read(entry, &file, naming).map_err(|error| explain(error, path, &entry.file, entry.at))?;
-            warnings.extend(entry.constant_rate(&mut recording));
+            warnings.extend(entry.constant_rate(&mut recording)?);
             match entry.kind {
                 RunKind::Rotation => recording.require_turn(instrument, manifest.reference)?,
                 RunKind::CrossAxis => recording.require_rotation()?,

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use cvg_model::{ActuationGains, ControlOutputs, Envelope, Orbit};
 
 use super::*;
-use crate::carrier::recording;
+use crate::carrier::seen;
 use crate::numerics::statistics::line;
 
 const HZ: f64 = 100.0;
@@ -46,8 +46,8 @@ fn driven(pushes: f64, adds: f64) -> Recording {
     Recording { t_s, x_v: Some(x), y_v: Some(y), fx_v: Some(fx), fy_v: Some(fy), ..Recording::default() }
 }
 
-fn demodulated(r: Recording) -> Recording {
-    recording(r, "run", Some(HZ), RunKind::Rotation).expect("a carrier")
+fn demodulated(r: &Recording) -> Recording {
+    seen(r, "run", Some(HZ), RunKind::Rotation).expect("a carrier").expect("at the carrier")
 }
 
 fn orbits(r: &Recording) -> Vec<Orbit<f64>> {
@@ -59,7 +59,7 @@ fn orbits(r: &Recording) -> Vec<Orbit<f64>> {
 /// ȧ ∋ −f_as/2ω: what pushes a vibration is a negative v_as, of the size that its growth says.
 #[test]
 fn a_force_along_the_velocity_is_an_energy_command_that_brings_energy_in() {
-    let r = demodulated(driven(0.05, 0.0));
+    let r = demodulated(&driven(0.05, 0.0));
     let (v_as, orbits) = (r.vas_v.as_deref().expect("forces"), orbits(&r));
     let ln_a: Vec<f64> = orbits.iter().map(|o| o.a.ln()).collect();
     let grows = line(&r.t_s, &ln_a).0;
@@ -73,7 +73,7 @@ fn a_force_along_the_velocity_is_an_energy_command_that_brings_energy_in() {
 /// q̇ ∋ +f_qc/2ω: what adds quadrature is a positive v_qc, of the size that its growth says.
 #[test]
 fn a_force_across_the_pattern_with_the_displacement_is_a_quadrature_command() {
-    let r = demodulated(driven(0.0, 1.0));
+    let r = demodulated(&driven(0.0, 1.0));
     let (v_qc, orbits) = (r.vqc_v.as_deref().expect("forces"), orbits(&r));
     let q: Vec<f64> = orbits.iter().map(|o| o.q).collect();
     let grows = line(&r.t_s, &q).0;
@@ -149,7 +149,7 @@ fn a_force_that_turns_the_pattern_is_named_but_in_a_ring_down() {
 fn outputs_that_are_recorded_stand_over_forces() {
     let mut r = driven(0.05, 0.0);
     r.vas_v = Some(vec![-3.0; r.len()]);
-    let r = demodulated(r);
+    let r = demodulated(&r);
     assert!(r.vas_v.iter().flatten().all(|v| *v == -3.0) && r.vqc_v.is_none());
     assert!(r.warnings.iter().any(|w| w.contains("fx_v and fy_v are not used: vas_v or vqc_v is recorded itself")));
 }
@@ -158,7 +158,7 @@ fn outputs_that_are_recorded_stand_over_forces() {
 fn a_force_that_is_missing_is_missing_in_its_envelope() {
     let mut r = driven(0.05, 0.0);
     r.fy_v.iter_mut().for_each(|f| f[1000] = f64::NAN);
-    let v_as = demodulated(r).vas_v.expect("forces");
+    let v_as = demodulated(&r).vas_v.expect("forces");
     assert_eq!(v_as.iter().filter(|v| v.is_nan()).count(), 1);
 }
 
@@ -167,7 +167,7 @@ fn forces_in_a_decay_are_named_where_there_are_any() {
     let said = |pushes: f64, scale: f64| {
         let mut r = driven(pushes, 0.0);
         [&mut r.fx_v, &mut r.fy_v].into_iter().flatten().flatten().for_each(|f| *f *= scale);
-        recording(r, "run", Some(HZ), RunKind::Decay).expect("a carrier").warnings.join("\n")
+        seen(&r, "run", Some(HZ), RunKind::Decay).expect("a carrier").expect("at the carrier").warnings.join("\n")
     };
     assert!(said(-0.05, 1.0).contains("fx_v and fy_v hold"), "{}", said(-0.05, 1.0));
     assert!(!said(-0.05, 0.0).contains("fx_v"), "{}", said(-0.05, 0.0));
