@@ -21,7 +21,7 @@ const USUAL_MACHINE: u64 = 4 << 30;
 /// Bytes that a number takes while a column is read: as stored, converted, and within its column.
 pub(crate) const PER_NUMBER: u64 = 24;
 /// … and once it is there.
-const HELD: u64 = 8;
+pub(crate) const HELD: u64 = 8;
 /// Bytes that a cell of an unknown column takes, which is kept as text.
 pub(crate) const PER_TEXT: u64 = 48;
 

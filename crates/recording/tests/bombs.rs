@@ -52,7 +52,7 @@ fn parquet(recording: &Recording) -> Vec<u8> {
 
 #[test]
 fn a_small_parquet_file_of_many_rows_is_refused() {
-    let bytes = parquet(&standstill(1_000_000));
+    let bytes = parquet(&standstill(4_000_000));
     assert!(bytes.len() < 100_000, "{} bytes", bytes.len());
     assert_too_large(read_file(&bytes));
 }

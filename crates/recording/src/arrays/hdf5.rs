@@ -8,7 +8,7 @@ use crate::admission;
 use crate::arrays::columns::{Named, push, refuse, table, unneeded};
 use crate::channel::Channel;
 use crate::error::ReadError;
-use crate::memory::{self, PER_NUMBER, PER_TEXT};
+use crate::memory::{self, HELD, PER_NUMBER, PER_TEXT};
 use crate::naming::Naming;
 use crate::stamp::Stamp;
 
@@ -46,13 +46,15 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>,
     let unneeded: Vec<Option<String>> =
         listed.iter().map(|array| rows.and_then(|rows| unneeded(&array.size, rows))).collect();
     let mut needed = held;
-    for (array, _) in listed.iter().zip(&unneeded).filter(|(_, unneeded)| unneeded.is_none()) {
+    for ((array, name), _) in listed.iter().zip(&names).zip(&unneeded).filter(|(_, unneeded)| unneeded.is_none()) {
         let dataset = file.dataset(&array.path).map_err(say)?;
         let element = dataset.element_size().map_err(say)?;
         let values = array.size.iter().copied().fold(1, u64::saturating_mul);
         // a part of an array is unfolded as a whole, whatever of it is used
         let part = dataset.chunk_shape().map_err(say)?.unwrap_or_default().into_iter().fold(1, u64::saturating_mul);
-        needed = needed.saturating_add(values.saturating_mul(PER_NUMBER + PER_TEXT + element));
+        let is_column = naming.channel(name).is_some() && is_number(&dataset);
+        let each = if is_column { HELD } else { PER_NUMBER + PER_TEXT + element };
+        needed = needed.saturating_add(values.saturating_mul(each));
         memory::allow(needed.saturating_add(part.saturating_mul(2 * element)), "its arrays", source)?;
     }
     let (mut arrays, mut dated) = (Vec::new(), None);
@@ -77,6 +79,12 @@ fn decode(bytes: Vec<u8>, naming: &Naming, source: &Path) -> Result<(Vec<Named>,
         push(&mut arrays, name, &size, values, false);
     }
     Ok((arrays, dated))
+}
+
+/// Whether a data set is of plain numbers, which are decoded a part at a time.
+fn is_number(dataset: &hdf5_pure::Dataset) -> bool {
+    use hdf5_pure::DType::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+    matches!(dataset.dtype(), Ok(F32 | F64 | I8 | I16 | I32 | I64 | U8 | U16 | U32 | U64))
 }
 
 /// Texts that are all dates, as seconds from the first, and what there is to say of them.

@@ -207,7 +207,7 @@ pub(super) fn read_column(
     // the first of time stamps: what is left of them has few enough digits for a number
     let mut first_stamp = None;
     let mut column = match field {
-        Field::Number(_) => Column::Numbers(vec![], Missing::default()),
+        Field::Number(_) => Column::Numbers(room_for(reader, groups.clone()), Missing::default()),
         Field::Text(_) => Column::Texts(Cells::default()),
     };
     for group in groups {
@@ -263,6 +263,14 @@ pub(super) fn read_column(
         }
     }
     Ok(column)
+}
+
+/// Room for the rows of these row groups; without it now, a column grows as it needs it.
+fn room_for(reader: &SerializedFileReader<File>, groups: Range<usize>) -> Vec<f64> {
+    let rows = groups.map(|group| reader.metadata().row_group(group).num_rows()).fold(0, i64::saturating_add);
+    let mut values = Vec::new();
+    let _ = values.try_reserve_exact(usize::try_from(rows).unwrap_or_default());
+    values
 }
 
 fn add(column: &mut Column, value: Option<f64>) {

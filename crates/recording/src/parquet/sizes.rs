@@ -10,7 +10,7 @@ use std::path::Path;
 use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
 
 use crate::error::ReadError;
-use crate::memory::{self, PER_NUMBER, PER_TEXT};
+use crate::memory::{self, HELD, PER_TEXT};
 
 /// Bytes within which the header of a page ends.
 const LONGEST_HEADER: u64 = 64 << 10;
@@ -53,21 +53,20 @@ pub(super) fn check(
 ) -> Result<(), ReadError> {
     let length = file.metadata().map_err(|error| ReadError::io(source, error))?.len();
     let damaged = |what: String| ReadError::Parquet { path: source.to_path_buf(), what };
-    let mut needed = 0_u64;
+    // chunks are unfolded one after the other
+    let (mut needed, mut chunk_bytes) = (0_u64, 0_u64);
     for group in groups {
         let rows = u64::try_from(group.num_rows()).map_err(|_| damaged("the file is damaged".into()))?;
-        let mut chunk_bytes = 0;
         for (&at, &is_text) in kept.iter().zip(is_text) {
             let Some(chunk) = group.columns().get(at) else { return Err(damaged("the file is damaged".into())) };
             let stated = u64::try_from(chunk.uncompressed_size()).unwrap_or(u64::MAX);
             // dictionaries are unfolded: a text is at most the longest of them, which the chunk holds
-            let row = if is_text { PER_TEXT } else { PER_NUMBER };
+            let row = if is_text { PER_TEXT } else { HELD };
             needed = rows.saturating_mul(row).saturating_add(needed);
             chunk_bytes = stated.max(chunk_bytes);
         }
-        needed = needed.saturating_add(chunk_bytes.saturating_mul(2));
     }
-    memory::allow(needed, "its columns", source)?;
+    memory::allow(needed.saturating_add(chunk_bytes.saturating_mul(2)), "its columns", source)?;
     for group in groups {
         for chunk in kept.iter().filter_map(|&at| group.columns().get(at)) {
             pages(chunk, group.num_rows(), &mut file, length)
