@@ -308,6 +308,19 @@ proptest! {
         prop_assert_near!(out.x_c * f.x_s - out.x_s * f.x_c, 0.0, 1e-12);
     }
 
+    /// Whole steps, and never further than half a step from what is commanded, whatever the other phase and the other axis do.
+    #[test]
+    fn prop_a_drive_of_few_steps_puts_out_whole_ones(
+        step in 1e-3..1.0_f64, x_c in -9.0..9.0_f64, x_s in -9.0..9.0_f64, y_c in -9.0..9.0_f64, y_s in -9.0..9.0_f64,
+    ) {
+        let f = cvg_model::AxisForces { x_c, x_s, y_c, y_s };
+        let out = EffectId::DriveQuantisation.actuate(&values(&[step]), f);
+        for (out, f) in [(out.x_c, x_c), (out.x_s, x_s), (out.y_c, y_c), (out.y_s, y_s)] {
+            prop_assert_near!(out / step, (out / step).round(), 1e-8);
+            prop_assert!((out - f).abs() <= 0.5 * step * (1.0 + 1e-8), "{out} of {f}");
+        }
+    }
+
     /// θ̇ = −kΩ0(1 + w cos(nα + phase)) with α̇ = Ω0 integrates to −(kw/n) sin(nα + phase).
     #[test]
     fn prop_table_ripple_follows_the_table_and_not_the_pattern(

@@ -11,7 +11,7 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 25] = [
+const IDS: [&str; 26] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
@@ -20,6 +20,7 @@ const IDS: [&str; 25] = [
     "detection-quintic",
     "detection-saturation",
     "drive-feedthrough",
+    "drive-quantisation",
     "drive-saturation",
     "temperature",
     "skew-temperature",

@@ -155,6 +155,28 @@ fn a_clipped_carrier_is_scaled_by_its_describing_function() {
 }
 
 #[test]
+fn a_drive_of_few_steps_puts_out_whole_ones_in_either_phase() {
+    let put_out = |step: f64, f: AxisForces<f64>| EffectId::DriveQuantisation.actuate(&[step, 0.0, 0.0, 0.0], f);
+    let f = put_out(0.2, AxisForces { x_c: 0.29, x_s: -0.31, y_c: 0.09, y_s: -7.12 });
+    assert_abs_diff_eq!(f.x_c, 0.2, epsilon = 1e-15);
+    assert_abs_diff_eq!(f.x_s, -0.4, epsilon = 1e-15);
+    assert_abs_diff_eq!(f.y_c, 0.0, epsilon = 1e-15);
+    assert_abs_diff_eq!(f.y_s, -7.2, epsilon = 1e-13);
+    // finer than any converter, or none: nothing is rounded, and what is no number stays none
+    let f = AxisForces { x_c: 1.0, x_s: -2.0, y_c: 3e300, y_s: f64::NAN };
+    for step in [0.0, -0.1, 1e-6, f64::NAN] {
+        let out = put_out(step, f);
+        assert_eq!((out.x_c, out.x_s, out.y_c), (1.0, -2.0, 3e300), "{step}");
+        assert!(out.y_s.is_nan(), "{step}");
+    }
+    // 65 536 steps are rounded to a millionth of one
+    let f = put_out(1.0, AxisForces { x_c: 65_535.3, x_s: -65_535.3, y_c: 65_536.3, y_s: 0.0 });
+    assert_abs_diff_eq!(f.x_c, 65_535.0, epsilon = 1e-6);
+    assert_abs_diff_eq!(f.x_s, -65_535.0, epsilon = 1e-6);
+    assert_eq!(f.y_c, 65_536.3);
+}
+
+#[test]
 fn readouts_of_the_angle_turn_the_vibration() {
     let turned = |angle: f64| VIBRATION.turned(angle.sin(), angle.cos());
     // θ(t − t_d) of a pattern that precesses at −0.4 rad/s
@@ -395,8 +417,9 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         let all = EffectId::ALL.iter().map(|id| id.description());
         all.filter(|d| d.stage == stage && listed.contains(&d.id)).map(|d| d.id).collect()
     };
-    // amplifiers, then axes
-    let drives = ["drive-saturation", "actuation-gain-mismatch", "actuation-skew", "actuation-phase"];
+    // converters, amplifiers, then axes
+    let drives =
+        ["drive-quantisation", "drive-saturation", "actuation-gain-mismatch", "actuation-skew", "actuation-phase"];
     assert_eq!(at(Stage::Actuation, &drives), drives);
     // what is added to the angle of the vibration, then plates, axes, amplifier, and the converter
     let angle = ["harmonic-n", "time-periodic", "angle-latency"];

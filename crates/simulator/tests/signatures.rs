@@ -346,6 +346,27 @@ fn angle_latency_is_a_constant_that_changes_sign_with_the_rate() {
 }
 
 #[test]
+fn drive_quantisation_makes_the_loops_ask_for_half_a_step_where_less_would_do() {
+    // of the largest command of an axis, over what replaces the damping
+    let asked = |effect: &str| {
+        let run = rotation(effect, 20.0, 60.0);
+        let theta = angles(&run, Period::Pattern);
+        let all = theta.iter().zip(column(&run, "vas_v")).map(|(theta, v)| {
+            let (sin, cos) = theta.sin_cos();
+            22.0 * v.abs() * sin.abs().max(cos.abs())
+        });
+        let mut all: Vec<f64> = all.collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    };
+    close(asked(""), 0.9);
+    for steps in [4.0, 8.0] {
+        let effect = format!(r#"{{ id = "drive-quantisation", step = {:?} }}"#, steps / 22.0);
+        close(asked(&effect), 0.5 * steps);
+    }
+}
+
+#[test]
 fn the_readout_of_the_amplitude_is_held_by_the_energy_loop() {
     // the amplitude signature of a readout effect is in the true energy: what is read stays at the set point
     let run = rotation(r#"{ id = "detection-gain-mismatch", detection_gain_ratio = 1.02 }"#, 10.0, 20.0);

@@ -10,6 +10,7 @@ pub(crate) mod held_reference;
 pub(crate) mod interpolated;
 pub(crate) mod leaping_rows;
 pub(crate) mod plausibility;
+pub(crate) mod quantised_drives;
 pub(crate) mod rail;
 mod rate_spikes;
 pub(crate) mod references;

@@ -19,6 +19,8 @@ use crate::numerics::interpolation;
 use crate::numerics::statistics::{root_mean_square, span};
 use crate::recording::{Role, Run};
 
+mod put_out;
+
 /// A rotation run, ready for a fit.
 #[derive(Debug)]
 pub(crate) struct Track {
@@ -43,6 +45,8 @@ pub(crate) struct Track {
     pub(crate) has_table: bool,
     source: Source,
     commands: Option<[Vec<f64>; 2]>,
+    /// what drives put out across the pattern in quadrature with it, V, where that is known: v_as has no part there
+    across: Option<Vec<f64>>,
     /// temperature, °C, and over the one that parameters refer to, K
     temp_c: Option<Vec<f64>>,
     warmer_k: Vec<f64>,
@@ -184,6 +188,7 @@ impl Track {
                 }
             },
             commands: self.commands.as_ref().map(|[a, q]| [command(a), command(q)]),
+            across: self.across.as_deref().map(command),
             temp_c: self.temp_c.as_deref().map(of),
             warmer_k: of(&self.warmer_k),
             turn_rad_s: of(&self.turn_rad_s),
@@ -245,6 +250,7 @@ impl Track {
             has_table,
             source,
             commands,
+            across: None,
             temp_c,
             warmer_k,
             turn_rad_s,
@@ -279,6 +285,7 @@ impl Track {
         let change = |v: &[f64]| if interval > 0.0 { (v[to] - v[from]) / interval } else { 0.0 };
         Some(Commands {
             now: ControlOutputs { v_as: thinned(v_as, i, width), v_qc: thinned(v_qc, i, width) },
+            across: self.across.as_ref().map_or(0.0, |v| thinned(v, i, width)),
             change_per_s: ControlOutputs { v_as: change(v_as), v_qc: change(v_qc) },
             turn_rad_s: self.turn_rad_s[i],
         })

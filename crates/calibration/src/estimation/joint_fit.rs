@@ -4,6 +4,7 @@ use cvg_model::effects::{Belief, EffectId, Parameter, Role as ParameterRole, Sta
 
 use crate::data::leaping_rows;
 use crate::data::plausibility::{without_commands_in_another_unit, without_dead_command, without_held_commands};
+use crate::data::quantised_drives::{Quantisation, quantisation};
 use crate::data::track::Track;
 use crate::error::Refusal;
 use crate::estimation::actuation::{DriveGains, RingDown};
@@ -13,6 +14,7 @@ use crate::estimation::initial_guess::{Motion, common_gain, pulled};
 use crate::estimation::propagation::Start;
 use crate::estimation::residuals::{Window, residuals};
 use crate::estimation::screening::{Screen, stated};
+use crate::estimation::unknown_drives::command_rms;
 use crate::model::hypothesis::{Hypothesis, Origin, Unknown};
 use crate::numerics::statistics::{median, robust_deviation, root_mean_square, white_noise};
 use crate::recording::{Campaign, Instrument, Role, RunKind};
@@ -68,6 +70,8 @@ pub(crate) struct Dataset {
     pub(crate) held: Vec<EffectId>,
     /// 1/level at which the drives clip and its uncertainty, 1/V, as the quadrature balance tells it
     pub(crate) clipping: Option<(f64, f64)>,
+    /// the steps that the drives put out, of which the tracks have the mean
+    pub(crate) quantisation: Option<Quantisation>,
     /// the runs tell what the commands do from the rest, and the fit at hand adjusts it
     pub(crate) drive_is_free: bool,
     /// fits begin with it free and where the hypothesis has it: nothing is missing that would drag it along
@@ -132,7 +136,11 @@ impl Dataset {
             start.follows_input = true;
             start.angular_gain = -start.angular_gain;
         }
+        let quantisation = quantisation(prepared.iter().map(|p| &p.track));
         for p in &mut prepared {
+            if let Some(quantisation) = &quantisation {
+                quantisation.apply(&mut p.track);
+            }
             let precession = start.precession(p.track.mean_speed());
             p.track.thin(precession);
         }
@@ -158,6 +166,7 @@ impl Dataset {
             damping_balance: None,
             held: Vec::new(),
             clipping: None,
+            quantisation,
             drive_is_free: false,
             drive_is_free_at_once: false,
             counts_every_run: false,
@@ -267,7 +276,8 @@ impl Dataset {
         let silent = self.believed_force_scale().map_or((0.0, belief::FORCING_PER_S / self.commanded()), |s| (s, s));
         let share = if considered { BALANCE_SHARE_ALONE } else { BALANCE_SHARE };
         let balance = self.energy_balance.map(|(scale, deviation)| (scale, deviation.max(share * scale)));
-        let scale = drive.map(|d| (d.mean(), d.mean() * d.mean_error.max(1e-4))).or(balance).unwrap_or(silent);
+        let told = self.told_with_the_step().or(balance).unwrap_or(silent);
+        let scale = drive.map_or(told, |d| (d.mean(), d.mean() * d.mean_error.max(1e-4)));
         all.push(Prior { considered, ..prior(Unknown::ForceScale, scale.0, scale.1) });
         // A search finds a line to a fraction of its width: beyond that lies another line.
         let spans = self.tracks.iter().map(|p| p.track.t_s[p.track.t_s.len() - 1] - p.track.t_s[0]);
@@ -300,6 +310,11 @@ impl Dataset {
         // at none nothing that the drive does has a slope
         if hypothesis.force_scale <= 0.0 {
             hypothesis.force_scale = self.believed_force_scale().unwrap_or(0.0);
+        }
+        if let Some((scale, _)) = self.told_with_the_step() {
+            // what is put out within a step has the amplitude in it
+            hypothesis.force_scale = scale;
+            return;
         }
         let starts: Vec<_> = self.tracks.iter().map(|p| p.starts.clone()).collect();
         let Some(balance) = energy_balance(&self.tracks, hypothesis, &starts) else { return };
@@ -442,22 +457,6 @@ fn mean_temperature(tracks: &[Prepared]) -> Option<f64> {
     let all = || fitted_tracks(tracks).flat_map(Track::temperatures_c);
     let count = all().count();
     (count > 0).then(|| all().sum::<f64>() / count as f64)
-}
-
-/// rms of the energy and the quadrature command per unit of amplitude over the runs that are fitted, V/V.
-fn command_rms(tracks: &[Prepared]) -> [f64; 2] {
-    let (mut n, mut squares) = (0.0, [0.0; 2]);
-    for track in fitted_tracks(tracks) {
-        for i in (0..track.t_s.len()).step_by((track.t_s.len() / 2000).max(1)) {
-            let e = track.envelope(i).pendulum().e;
-            if let Some(v) = track.commands(i, 1).filter(|_| e > 0.0) {
-                n += 1.0;
-                squares[0] += v.now.v_as * v.now.v_as / e;
-                squares[1] += v.now.v_qc * v.now.v_qc / e;
-            }
-        }
-    }
-    squares.map(|s: f64| if n > 0.0 { (s / n).sqrt() } else { 0.0 })
 }
 
 /// A hypothesis fitted, and what the ring-downs said.

@@ -16,6 +16,7 @@ pub(crate) mod joint_fit;
 pub(crate) mod normal;
 pub(crate) mod propagation;
 mod quadrature_balance;
+pub(crate) mod quantised_drives;
 pub(crate) mod residuals;
 pub(crate) mod restricted_likelihood;
 pub(crate) mod ring_down_agreement;

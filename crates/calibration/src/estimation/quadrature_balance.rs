@@ -69,7 +69,8 @@ impl Dataset {
             let fastest = fastest.fold(0.0, f64::max);
             let [at_rest, at_speed] = QUADRATURE_SHARE;
             let trusted = at_rest + (at_speed - at_rest) * fastest.min(1.0);
-            let share = drive.map_or(BALANCE_SHARE, |d| trusted.hypot(d.mean_error));
+            let by_the_step = self.told_with_the_step().map(|(scale, deviation)| trusted.hypot(deviation / scale));
+            let share = drive.map(|d| trusted.hypot(d.mean_error)).or(by_the_step).unwrap_or(BALANCE_SHARE);
             let unseen = (LEAST_ANISOELASTICITY + PER_PRECESSION * fastest).min(MOST_ANISOELASTICITY);
             let deviation = share * w.norm() + unseen;
             self.quadrature_balance = Some(([w[0], w[1]], deviation));

@@ -7,8 +7,8 @@
 use cvg_model::effects::EffectId;
 use nalgebra::DMatrix;
 
-use crate::estimation::fit::Fit;
-use crate::estimation::joint_fit::{Dataset, Fitted, belief};
+use crate::estimation::fit::{Fit, Prepared};
+use crate::estimation::joint_fit::{Dataset, Fitted, belief, fitted_tracks};
 use crate::model::hypothesis::Unknown;
 
 /// Δ(1/τ) as a share of 1/τ, as in the paper's device (4.7e-3 1/s at 22 s),
@@ -63,4 +63,20 @@ pub(crate) fn said_of_the_damping(dataset: &Dataset, fitted: &Fitted) -> Option<
          neither is told from the other; vas_v would tell them apart, with ring-downs at 0° and 90°"
             .to_owned()
     })
+}
+
+/// rms of the energy and the quadrature command per unit of amplitude over the runs that are fitted, V/V.
+pub(super) fn command_rms(tracks: &[Prepared]) -> [f64; 2] {
+    let (mut n, mut squares) = (0.0, [0.0; 2]);
+    for track in fitted_tracks(tracks) {
+        for i in (0..track.t_s.len()).step_by((track.t_s.len() / 2000).max(1)) {
+            let e = track.envelope(i).pendulum().e;
+            if let Some(v) = track.commands(i, 1).filter(|_| e > 0.0) {
+                n += 1.0;
+                squares[0] += v.now.v_as * v.now.v_as / e;
+                squares[1] += v.now.v_qc * v.now.v_qc / e;
+            }
+        }
+    }
+    squares.map(|s: f64| if n > 0.0 { (s / n).sqrt() } else { 0.0 })
 }

@@ -2,7 +2,7 @@
 
 use cvg_estimator::direction::{Direction, major_axis};
 use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Stage, Values};
-use cvg_model::{ActuationGains, ControlOutputs, Envelope, Real};
+use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Envelope, Real};
 
 use crate::model::hypothesis::{Hypothesis, Member, Unknown};
 use crate::model::jet::Jet;
@@ -14,6 +14,8 @@ use crate::recording::Instrument;
 pub(crate) struct Commands {
     pub(crate) now: ControlOutputs<f64>,
     pub(crate) change_per_s: ControlOutputs<f64>,
+    /// what is put out across the pattern besides, in quadrature with it
+    pub(crate) across: f64,
     /// how fast the pattern turned that they were computed from, rad/s
     pub(crate) turn_rad_s: f64,
 }
@@ -270,7 +272,7 @@ impl<'h> Predictor<'h> {
         let still = ControlOutputs { v_as: 0.0, v_qc: 0.0 };
         let axis = major_axis(seen, &seen.pendulum());
         let unit = |drive: &Drive<Jet>, now| {
-            let held = Commands { now, change_per_s: still, turn_rad_s: at.precession_rad_s };
+            let held = Commands { now, change_per_s: still, across: 0.0, turn_rad_s: at.precession_rad_s };
             drive.rate(&held, &axis, Jet::constant)
         };
         let energies = self.loops.iter().map(|drive| unit(drive, ControlOutputs { v_as: 1.0, ..still }));
@@ -321,15 +323,18 @@ impl<T: Real> Drive<T> {
     /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
     /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects, which are of volts.
     #[inline]
-    fn rate(&self, v: &Commands, seen: &Direction<f64>, lift: impl Fn(f64) -> T) -> Envelope<T> {
+    fn rate(&self, commands: &Commands, seen: &Direction<f64>, lift: impl Fn(f64) -> T) -> Envelope<T> {
         let latency = self.control_latency_s;
-        let (sin_late, cos_late) = (latency * lift(v.turn_rad_s)).sin_cos();
+        let (sin_late, cos_late) = (latency * lift(commands.turn_rad_s)).sin_cos();
         let (cos, sin) = (lift(seen.cos), lift(seen.sin));
         let held = |now: f64, change: f64| lift(now) - latency * lift(change);
-        let v =
-            ControlOutputs { v_as: held(v.now.v_as, v.change_per_s.v_as), v_qc: held(v.now.v_qc, v.change_per_s.v_qc) };
+        let (now, change) = (&commands.now, &commands.change_per_s);
+        let v = ControlOutputs { v_as: held(now.v_as, change.v_as), v_qc: held(now.v_qc, change.v_qc) };
         let equal = ActuationGains { x: T::one(), y: T::one() };
-        let volts = equal.axis_forces_along(&v, cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late);
+        let (cos, sin) = (cos * cos_late + sin * sin_late, sin * cos_late - cos * sin_late);
+        let along = equal.axis_forces_along(&v, cos, sin);
+        let across = lift(commands.across);
+        let volts = AxisForces { x_s: along.x_s - across * sin, y_s: along.y_s + across * cos, ..along };
         let forces = self.effects.iter().fold(volts, |f, (id, values)| id.actuate(values, f));
         forces.envelope_rate(T::one()) * self.force_scale
     }

@@ -6,6 +6,7 @@ use crate::diagnostics::drives::clipping;
 use crate::diagnostics::scale_factor::scale_factor_of;
 use crate::error::Refusal;
 use crate::estimation::joint_fit::{Dataset, declared_hypothesis};
+use crate::estimation::quantised_drives::with_quantised_drives;
 use crate::estimation::unknown_drives::with_unknown_drives;
 use crate::identified::{Identification, Options};
 use crate::rate_table::errors::Errors;
@@ -63,6 +64,7 @@ pub(crate) fn identify(
     }
     let with_hidden = with_what_was_not_found(&mut dataset, &fitted, &covariance);
     let with_hidden = with_unknown_drives(&dataset, &fitted, with_hidden);
+    let with_hidden = with_quantised_drives(&dataset, &fitted, with_hidden);
     let with_hidden = dataset.with_the_other_damping(&fitted.fit, with_hidden);
     not_claimed_beside_another_damping(&dataset, &mut fitted, &mut steps);
     let scale_factor = scale_factor_of(&mut dataset, &fitted);

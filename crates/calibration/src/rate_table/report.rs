@@ -4,6 +4,7 @@ use cvg_model::effects::EffectId;
 use cvg_model::effects::harmonic_n::scaling::DIRECTION;
 use nalgebra::DMatrix;
 
+use crate::data::quantised_drives::Quantisation;
 use crate::diagnostics::influences::shares;
 use crate::diagnostics::plots::PlotContext;
 use crate::diagnostics::temperature::{LEAST_SPAN_K, Seen, temperature};
@@ -90,7 +91,9 @@ impl Found {
         let detection_gain_ratio = inference.detection_ratio(&own_ratios, &mut warnings);
         let actuation_gain_ratio = inference.actuation_ratio(detection_gain_ratio, &mut warnings);
         let mut effects = inference.effects(&self.steps, &errors.discovered);
+        effects.extend(dataset.quantisation.as_ref().and_then(Quantisation::report));
         effects.extend(self.drives.clone());
+        warnings.extend(dataset.quantisation.as_ref().map(Quantisation::said));
         warnings.extend(self.drives.as_ref().map(|_| CLIPPED_DRIVES.to_owned()));
         warnings.extend(effects.iter().filter(|e| !e.confounded_with.is_empty()).map(confounded));
         let angular_gain = inference.angular_gain(&mut warnings);

@@ -66,7 +66,9 @@ pub(crate) fn candidates(
         let unresolved = is_of_a_higher_power(id) && dataset.alike().amplitude;
         // the angle hardly shows drives that clip: the quadrature balance tells them
         let told_elsewhere = id.limits_drives() && id.in_library();
-        if d.declared || unseen || told_elsewhere || unmeasured || unresolved || (sensor && !d.in_sensors) {
+        // a force that nobody knows within a step of the drives does what a spring does, and drives that are late or askew
+        let hidden = dataset.quantisation.is_some() && matches!(d.stage, Stage::Mechanics | Stage::Actuation);
+        if d.declared || unseen || told_elsewhere || hidden || unmeasured || unresolved || (sensor && !d.in_sensors) {
             continue;
         }
         if d.scaling.rate > 0 && !dataset.rate_varies() {

@@ -25,6 +25,7 @@ pub mod detection_quintic;
 pub mod detection_saturation;
 pub mod detection_skew;
 pub mod drive_feedthrough;
+pub mod drive_quantisation;
 pub mod drive_saturation;
 pub mod gain_drift;
 pub mod harmonic_n;
@@ -527,10 +528,10 @@ impl EffectId {
         false
     }
 
-    /// Whether it limits what the drives put out, so that forces are not in proportion to the commands.
+    /// Whether it limits or rounds what the drives put out, so that forces are not in proportion to the commands.
     pub fn limits_drives(self) -> bool {
         let d = self.description();
-        d.stage == Stage::Actuation && !d.onsets.is_empty()
+        d.stage == Stage::Actuation && (!d.onsets.is_empty() || self == Self::DriveQuantisation)
     }
 
     /// Whether a readout effect is added to the angle of the vibration itself, before plates, axes, amplifier and converter.
@@ -554,7 +555,7 @@ impl core::fmt::Display for EffectId {
     }
 }
 
-// The list. Actuation and readout effects stand in the order in which the signal meets them: the drives' amplifiers, their
+// The list. Actuation and readout effects stand in the order in which the signal meets them: the drives' converters, their amplifiers, their
 // axes; what is added to the angle of the vibration itself, then plates, axes, amplifier and converter.
 library! {
     TableHarmonic => table_harmonic::TableHarmonic,
@@ -564,6 +565,7 @@ library! {
     Anisodamping => anisodamping::Anisodamping,
     Anisoelasticity => anisoelasticity::Anisoelasticity,
     SpringCubic => spring_cubic::SpringCubic,
+    DriveQuantisation => drive_quantisation::DriveQuantisation,
     DriveSaturation => drive_saturation::DriveSaturation,
     ActuationGainMismatch => actuation_gain_mismatch::ActuationGainMismatch,
     ActuationSkew => actuation_skew::ActuationSkew,

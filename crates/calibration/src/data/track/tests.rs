@@ -89,3 +89,36 @@ fn a_run_of_samples_that_are_all_needed_stays_as_it_is() {
     assert!(!track.is_thinned());
     assert_eq!(track.dense().t_s.len(), long().t_s.len());
 }
+
+#[test]
+fn what_is_put_out_more_than_commanded_is_another_command_and_what_pushes_across() {
+    let n = 400;
+    let of = |f: fn(f64) -> f64| Some((0..n).map(|i| f(0.02 * f64::from(i))).collect::<Vec<_>>());
+    let recording = Recording {
+        t_s: (0..n).map(|i| 0.01 * f64::from(i)).collect(),
+        rate_dps: Some(vec![2.0_f64.to_degrees(); 400]),
+        xc_v: of(f64::cos),
+        yc_v: of(f64::sin),
+        vas_v: of(|_| -0.2),
+        vqc_v: of(|theta| 0.5 * (2.0 * theta).sin()),
+        ..Recording::default()
+    };
+    let (file, kind) = ("spin.csv".into(), crate::recording::RunKind::Rotation);
+    let run = Run { kind, file, settle_s: 0.0, role: Role::Fit, amplitude: None, recording };
+    let mut track = Track::whole(run, std::f64::consts::PI).expect("a track");
+    let before = track.commands(150, 1).expect("commands");
+    assert_eq!(before.across.to_bits(), 0.0_f64.to_bits());
+    // at once on one interval, of which either end has half
+    let mut added = vec![[[0.0; 2]; 2]; 399];
+    added[150] = [[0.3, 0.1], [-0.2, 0.4]];
+    track.put_out(&added);
+    for i in [150, 151] {
+        let (sin, cos) = (0.02 * i as f64).sin_cos();
+        let after = track.commands(i, 1).expect("commands");
+        let was = 0.5 * (0.04 * i as f64).sin();
+        assert!((after.now.v_as + 0.2 - 0.5 * (0.3 * cos + 0.1 * sin)).abs() < 1e-12);
+        assert!((after.now.v_qc - was - 0.5 * (0.4 * cos + 0.2 * sin)).abs() < 1e-12);
+        assert!((after.across - 0.5 * (0.1 * cos - 0.3 * sin)).abs() < 1e-12);
+    }
+    assert_eq!(track.commands(152, 1).map(|v| v.across), Some(0.0));
+}
