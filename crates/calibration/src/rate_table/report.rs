@@ -111,6 +111,7 @@ impl Found {
         let mut runs = self.runs(head.runs, &mut warnings);
         warnings.extend(self.extrapolated());
         warnings.extend(fitted.fit.hypothesis.members.iter().filter_map(large_without_cause));
+        self.at_their_temperatures(&mut runs);
         let temperature = self.temperature(&mut runs, detection_gain_ratio.is_some().then_some(&own_ratios));
         let amplitudes: Vec<f64> = dataset.tracks.iter().map(|t| t.track.mean_amplitude()).collect();
         let mut report = Report {
@@ -236,6 +237,19 @@ impl Found {
                  temperature_c where it was recorded"
             )
         })
+    }
+
+    /// Gives each run the angular gain at its own temperature, where what it tells was taken back to one of all.
+    fn at_their_temperatures(&self, runs: &mut [RunReport]) {
+        let h = &self.fitted.fit.hypothesis;
+        let Some((member, reference_c)) = h.member(EffectId::ScaleTemperature).zip(h.reference_c) else { return };
+        for (run, t) in self.dataset.screen.of(runs).into_iter().zip(&self.dataset.tracks) {
+            let (n, sum) = t.track.temperatures_c().fold((0.0, 0.0), |(n, sum), c| (n + 1.0, sum + c - reference_c));
+            let factor = 1.0 + member.values[0] * sum / f64::max(n, 1.0);
+            let scaled =
+                |gain: Estimate| Estimate { value: factor * gain.value, ci95: gain.ci95.map(|end| factor * end) };
+            run.angular_gain = run.angular_gain.map(scaled);
+        }
     }
 
     /// How what the runs tell goes with their temperatures.
