@@ -186,7 +186,7 @@ pub(crate) fn quantisation<'a>(tracks: impl Iterator<Item = &'a Track> + Clone) 
     let by_edges = EDGES * step * (step / largest).min(1.0);
     let told = Estimate::new(step, deviation.hypot(step - other).hypot(by_edges));
     let force_gain = within_a_step::gain(&pairs(tracks, TELL_THE_GAIN), step);
-    let force_gain = force_gain.filter(|gain| wide.gain(step) > LEAST_SHOWN * gain.value);
+    let force_gain = force_gain.filter(|gain| wide.gain(other) > LEAST_SHOWN * gain.value);
     Some(Quantisation { step: told, force_gain, largest, gain, share: least / before })
 }
 

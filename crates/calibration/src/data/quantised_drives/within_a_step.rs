@@ -25,7 +25,7 @@ const QUADRATURE: usize = 1;
 const ROUNDS: usize = 12;
 /// A gain that moves by less than this share with what is told within a step is the drives', and known to this share at best: it was seen to be
 /// off by 1 to 4 % (engineering choices).
-const SAME_GAIN: f64 = 0.25;
+const SAME_GAIN: f64 = 0.1;
 const KNOWN_TO: f64 = 0.05;
 /// Harmonics of the pattern that say nothing of the forces.
 const BESIDE: [f64; 2] = [2.0, 4.0];
