@@ -387,8 +387,8 @@ fn a_dead_zone_of_the_readout_is_not_taken_for_a_cubic_and_a_quintic() {
     });
     let identified = identify_folder(folder.path()).unwrap();
     is_left_unexplained(&identified, "pattern-harmonic", Some(8));
-    // it goes with 1/a: to first order, and less where the zone is a larger share of the amplitude
-    is_proposed(&identified, "pattern", Some(8.0), "readout", [Some(0.0), None]);
+    is_proposed(&identified, "pattern", Some(4.0), "readout", [None, None]);
+    assert!(identified.report.proposals[0].map["x'"].contains("abs(x) - d"), "{:?}", identified.report.proposals);
 }
 
 /// θ̇ ∝ |cos θ|: 4θ is one of its harmonics and all that a cubic spring would show.

@@ -6,6 +6,7 @@
 use cvg_model::effects::EffectId;
 use nalgebra::DMatrix;
 
+use crate::data::quantised_drives::Quantisation;
 use crate::estimation::actuation::RingDown;
 use crate::estimation::joint_fit::{Dataset, Fitted};
 use crate::model::hypothesis::Unknown;
@@ -26,7 +27,7 @@ impl Dataset {
 
     /// How far a force may be from the one that is taken for it, as a standard deviation, V.
     pub(crate) fn unknown_force(&self) -> Option<f64> {
-        self.quantisation.as_ref().map(|q| q.unknown_force())
+        self.quantisation.as_ref().map(Quantisation::unknown_force)
     }
 }
 

@@ -53,9 +53,12 @@ pub(crate) fn one_law(dataset: &mut Dataset, fitted: &Fitted) -> Result<Option<O
         return Ok(None);
     }
     let numbers = |h: &Hypothesis| h.effect_unknowns().len();
+    // asked about what was found when that was fitted, and by fits with a law about another instrument
+    let damping = dataset.damping_balance;
     for explained in scopes {
         let found = best_law(dataset, fitted, &explained);
         dataset.restore(fitted);
+        dataset.damping_balance = damping;
         let Some(found) = found? else { continue };
         let is_simpler = numbers(&found.fit.hypothesis) < numbers(&fitted.fit.hypothesis);
         let explains = explains_as_much(dataset, &found.fit, &fitted.fit);

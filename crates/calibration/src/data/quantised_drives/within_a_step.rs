@@ -72,6 +72,10 @@ fn more(pair: &Pair, witness: usize, left: f64, gain: f64, step: f64, noise: &No
     let pulls = pair.pulls[witness].map(|pull| gain * pull);
     let open = pair.chords[witness].map(|chord| open(chord, step, noise.commands[witness]));
     let variance = pulls[0] * pulls[0] * open[0] + pulls[1] * pulls[1] * open[1] + noise.rates[witness].powi(2);
+    // what pulls nothing shows in no balance
+    if variance <= f64::MIN_POSITIVE || pulls == [0.0; 2] {
+        return [0.0; 2];
+    }
     [0, 1].map(|axis| (open[axis] * pulls[axis] * left / variance).clamp(-step, step))
 }
 
@@ -171,7 +175,7 @@ mod tests {
         let run = Run { kind, file: "spin.csv".into(), settle_s: 0.0, role: Role::Fit, amplitude: None, recording };
         let track = Track::whole(run, std::f64::consts::PI).expect("a track");
         // drives without a gain: the balances have no say
-        let added = put_out(&track, step, 1e-12);
+        let added = put_out(&track, step, 0.0);
         for (added, t) in added.iter().zip(&t_s) {
             let on_the_way = (0..1000).map(|part| rate * (t + 0.01 * (f64::from(part) + 0.5) / 1000.0));
             let more = on_the_way.fold([0.0; 2], |[x, y], theta| {
