@@ -239,16 +239,21 @@ impl Found {
         })
     }
 
-    /// Gives each run the angular gain at its own temperature, where what it tells was taken back to one of all.
+    /// Gives each run the angular gain and the drift at its own temperature, where what it tells was taken back to one of all.
     fn at_their_temperatures(&self, runs: &mut [RunReport]) {
         let h = &self.fitted.fit.hypothesis;
         let Some((member, reference_c)) = h.member(EffectId::ScaleTemperature).zip(h.reference_c) else { return };
         for (run, t) in self.dataset.screen.of(runs).into_iter().zip(&self.dataset.tracks) {
             let (n, sum) = t.track.temperatures_c().fold((0.0, 0.0), |(n, sum), c| (n + 1.0, sum + c - reference_c));
-            let factor = 1.0 + member.values[0] * sum / f64::max(n, 1.0);
-            let scaled =
-                |gain: Estimate| Estimate { value: factor * gain.value, ci95: gain.ci95.map(|end| factor * end) };
+            let share = member.values[0] * sum / f64::max(n, 1.0);
+            let scaled = |gain: Estimate| Estimate {
+                value: (1.0 + share) * gain.value,
+                ci95: gain.ci95.map(|end| (1.0 + share) * end),
+            };
             run.angular_gain = run.angular_gain.map(scaled);
+            // one way, a drift and a share of the gain are one number
+            let drift_dps = t.track.one_way_rate().map_or(0.0, |rate| (share * h.precession(rate)).to_degrees());
+            run.bias_dps = run.bias_dps.map(|bias| bias.turned(drift_dps));
         }
     }
 
