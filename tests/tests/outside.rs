@@ -421,8 +421,8 @@ fn with_one_more(number: u64, stage: &str, value: f64, map: &[(&str, &str)]) -> 
     settings
 }
 
-/// Laws of which harmonics and formulas of the library are the sight: each is proposed as what it is, and nothing else is. Two of them
-/// always, all with CVG_TRIALS=7.
+/// Laws of which harmonics and formulas of the library are the sight: each is proposed as what it is, and nothing else is. No cause is
+/// claimed but the skew that a growing crosstalk has in the mean, and that neither beside the law. Two of them always, all with CVG_TRIALS=7.
 #[test]
 fn one_law_is_proposed_in_the_place_of_what_it_looks_like() {
     const OF_A_DEAD_ZONE: &str = "min(1, p / max(abs(x), 1e-9))";
@@ -449,7 +449,12 @@ fn one_law_is_proposed_in_the_place_of_what_it_looks_like() {
         let named = [&identified, &again].map(|i| found(i, Origin::Discovered));
         let floors = [&identified, &again].map(over_floor);
         println!("{expected}: {named:?} {maps:?} {floors:.2?}");
-        maps.len() == 1 && maps[0].contains(expected) && named[1] == ["proposal-1"] && floors[1] <= CORRECTED
+        let only_a_skew = named[0].iter().all(|id| *id == "detection-skew" && expected.starts_with("s * abs(x)"));
+        only_a_skew
+            && maps.len() == 1
+            && maps[0].contains(expected)
+            && named[1] == ["proposal-1"]
+            && floors[1] <= CORRECTED
     });
     assert!(outcomes.iter().all(|told| *told), "{outcomes:?}");
 }

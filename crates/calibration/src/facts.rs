@@ -352,9 +352,9 @@ pub struct RunReport {
     pub spikes: usize,
     /// decay time constant, s
     pub tau_s: Option<Estimate>,
-    /// k as this run alone tells it, everything else as all runs have it; null where it does not
+    /// k as this run alone tells it at its own temperature, everything else as all runs have it; null where it does not
     pub angular_gain: Option<Estimate>,
-    /// bias of this run: precession at rest, as k of all runs leaves it, deg/s
+    /// bias of this run at its own temperature: precession at rest, as k of all runs leaves it, deg/s
     pub bias_dps: Option<Estimate>,
     /// angle error of this run less its best line, deg rms
     pub rms_deg: Option<f64>,

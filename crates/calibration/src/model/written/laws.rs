@@ -7,7 +7,8 @@ use cvg_model::effects::EffectId;
 
 use super::{EffectText, Law, ParameterText};
 
-/// Powers of its own amplitude with which the gain of a channel may change; those of the library are 2 and 4.
+/// Powers of its own amplitude with which the gain of a channel may change; those of the library are 2 and 4 (engineering choice, as are
+/// the others here).
 const GAIN_POWERS: [u32; 4] = [1, 3, 6, 8];
 const POWERS_OF_THE_LIBRARY: [u32; 2] = [2, 4];
 /// Powers of an amplitude with which a channel may be read in the other; a skew is 0.
@@ -17,6 +18,8 @@ const POWER_OF_A_SKEW: u32 = 0;
 const UNBOUNDED: f64 = 1e60;
 /// Harmonics of the pattern that may go with the square of the rate.
 const HARMONICS: [u32; 2] = [2, 4];
+/// How far a power reaches where no other was tried beyond it.
+const HALFWAY: f64 = 0.5;
 
 /// In what laws are alike that differ in their power of the amplitude alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,7 +94,7 @@ impl Nameless {
             let power = f64::from(power);
             other.map_or(power + beyond, |other| 0.5 * (power + f64::from(other)))
         };
-        [halfway(all().filter(|p| *p < power).max(), -0.5), halfway(all().filter(|p| *p > power).min(), 0.5)]
+        [halfway(all().filter(|p| *p < power).max(), -HALFWAY), halfway(all().filter(|p| *p > power).min(), HALFWAY)]
     }
 }
 
@@ -154,7 +157,7 @@ fn rate_squared(n: u32, turns: bool) -> Written {
     let map = [("theta'", format!("theta + {square} * (c * cos({n} * theta) - s * sin({n} * theta))"))];
     let meaning = "its size goes with the square of the rate: a force of inertia, or two lags".to_owned();
     let law = Law {
-        rate: Some([1.5, 2.5]),
+        rate: Some(around(2.0)),
         turns_with_direction: Some(turns),
         ..law("pattern", Some(n), "readout", meaning)
     };
@@ -166,8 +169,12 @@ fn kinked() -> Written {
     let map = [("theta_rate", "c * abs(cos(theta)) + s * abs(sin(theta))".to_owned())];
     let meaning =
         "the pattern precesses by what has a kink at the axes: a spring that is not the same both ways".to_owned();
-    let law = Law { rate: Some([-1.5, -0.5]), ..law("pattern", None, "mechanics", meaning) };
+    let law = Law { rate: Some(around(-1.0)), ..law("pattern", None, "mechanics", meaning) };
     (Shape::Kinked, None, text("kinked-spring", "mechanics", &[("c", "rad/s"), ("s", "rad/s")], map, law))
+}
+
+fn around(power: f64) -> [f64; 2] {
+    [power - HALFWAY, power + HALFWAY]
 }
 
 fn law(follows: &str, n: Option<u32>, stage: &str, meaning: String) -> Law {
