@@ -7,6 +7,7 @@ mod container;
 mod csv;
 mod effect;
 mod identify;
+mod lie;
 mod scenario;
 mod step;
 
@@ -21,6 +22,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("csv", csv::run),
     ("effect", effect::run),
     ("identify", identify::run),
+    ("lie", lie::run),
     ("scenario", scenario::run),
     ("step", step::run),
 ];

@@ -58,17 +58,28 @@ pub fn all<T: Send>(count: u64, trial: impl Fn(u64) -> T + Sync) -> Vec<T> {
 
 /// Seeded draws.
 #[derive(Debug)]
-pub struct Draws(Noise);
+pub struct Draws {
+    /// what the first draws are, as shares, the next one last
+    script: Vec<f64>,
+    noise: Noise,
+}
 
 impl Draws {
     /// The draws of a seed: a stream that no simulated run uses.
     pub fn new(seed: u64) -> Self {
-        Self(Noise::new(seed, u64::MAX))
+        Self { script: Vec::new(), noise: Noise::new(seed, u64::MAX) }
+    }
+
+    /// Draws of which each of the first is what two bytes say; then those of a seed.
+    pub fn scripted(bytes: &[u8], seed: u64) -> Self {
+        let shares = bytes.chunks_exact(2).map(|b| f64::from(u16::from_le_bytes([b[0], b[1]])) / 65536.0);
+        Self { script: shares.rev().collect(), ..Self::new(seed) }
     }
 
     /// Evenly between two numbers.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        let share = self.0.angle_rad() / core::f64::consts::TAU + 0.5;
+        let drawn = |noise: &mut Noise| noise.angle_rad() / core::f64::consts::TAU + 0.5;
+        let share = self.script.pop().unwrap_or_else(|| drawn(&mut self.noise));
         low + share * (high - low)
     }
 

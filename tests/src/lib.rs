@@ -15,6 +15,8 @@ pub mod bench;
 #[cfg(feature = "recordings")]
 pub mod blind;
 #[cfg(feature = "recordings")]
+pub mod broken;
+#[cfg(feature = "recordings")]
 pub mod carrier;
 pub mod domain;
 pub mod effects;

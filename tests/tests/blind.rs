@@ -15,10 +15,10 @@ use cvg_tests::blind::{BALANCED, Bench, DRIVEN, Drawn, ELECTRONICS, Setup, setup
 use cvg_tests::domain::wrapped;
 
 /// Trials without `CVG_TRIALS`, under white and under coloured noise, and of what only a split or a thermometer tells.
-const TRIALS: u64 = 24;
-const COLOURED_TRIALS: u64 = 8;
-const ELECTRONICS_TRIALS: u64 = 8;
-const DRIVEN_TRIALS: u64 = 4;
+const TRIALS: u64 = 16;
+const COLOURED_TRIALS: u64 = 6;
+const ELECTRONICS_TRIALS: u64 = 6;
+const DRIVEN_TRIALS: u64 = 3;
 /// From this signature on, over the noise floor, an effect has to be named.
 const NAMED_ABOVE: f64 = 5.0;
 /// Shares of what has to come out, and the chance that a finder which just reaches them fails the trial.

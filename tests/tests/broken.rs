@@ -1,128 +1,16 @@
 //! Recordings that are not what they seem: each gets a right answer with the fault named, or none with its reason.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use cvg_calibration::recording::{Campaign, Instrument, Recording, Role, Run, RunKind};
+use cvg_calibration::recording::{Campaign, Instrument, Recording};
 use cvg_calibration::report::Status;
 use cvg_calibration::{Cause, Identification, Options, Refusal, identify};
 use cvg_tests::bench::Draws;
+use cvg_tests::broken::{ANGULAR_GAIN, Made, RATIO, Told, campaign, hold};
 
 #[path = "broken/amplitude.rs"]
 mod amplitude;
-#[path = "broken/damages.rs"]
-mod damages;
 #[path = "broken/lies.rs"]
 mod lies;
-
-const ANGULAR_GAIN: f64 = 0.78;
-const RATIO: f64 = 1.0132;
-const NOISE_V: f64 = 2e-5;
-
-/// What one run of a device is made of.
-#[derive(Debug, Clone)]
-struct Made {
-    rate_dps: f64,
-    duration_s: f64,
-    sample_hz: f64,
-    angular_gain: f64,
-    noise_v: f64,
-    seed: u64,
-    /// the table turns back and forth so many times, or one way throughout
-    swings: f64,
-    /// what the recording has of the table
-    reference: Told,
-    /// not a resonator, whose angle lags the table, but a sensor on its axis
-    is_sensor: bool,
-}
-
-/// What a recording has of the table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Told {
-    Rate,
-    Table,
-    Both,
-}
-
-impl Default for Made {
-    fn default() -> Self {
-        Self {
-            rate_dps: 500.0,
-            duration_s: 20.0,
-            sample_hz: 100.0,
-            angular_gain: ANGULAR_GAIN,
-            noise_v: NOISE_V,
-            seed: 1,
-            swings: 0.0,
-            reference: Told::Rate,
-            is_sensor: false,
-        }
-    }
-}
-
-impl Made {
-    /// A device with unequal gains, X and Y recorded and no commands.
-    fn recording(&self) -> Recording {
-        let mut draw = Draws::new(self.seed);
-        // the sum of twelve even draws has a variance of one
-        let mut noise = || self.noise_v * (0..12).map(|_| draw.between(-0.5, 0.5)).sum::<f64>();
-        let gain = if self.is_sensor { 1.0 } else { -self.angular_gain };
-        let theta: Vec<f64> = self.turned(&self.rates()).iter().map(|d| 0.3 + gain * d.to_radians()).collect();
-        let xc_v = theta.iter().map(|a| a.cos() + noise()).collect();
-        let yc_v = theta.iter().map(|a| RATIO * a.sin() + noise()).collect();
-        let mut recording = Recording {
-            source: format!("{}dps-{}.csv", self.rate_dps, self.seed).into(),
-            xc_v: Some(xc_v),
-            yc_v: Some(yc_v),
-            t_s: self.times(),
-            ..Recording::default()
-        };
-        self.tell(&mut recording, self.rates());
-        recording
-    }
-
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive count")]
-    fn times(&self) -> Vec<f64> {
-        let rows = (self.duration_s * self.sample_hz) as usize;
-        (0..rows).map(|i| i as f64 / self.sample_hz).collect()
-    }
-
-    /// The rates of the rows; between them the table's rate is a straight line.
-    fn rates(&self) -> Vec<f64> {
-        let swing = std::f64::consts::TAU * self.swings / self.duration_s;
-        self.times().iter().map(|t| self.rate_dps * (swing * t).cos()).collect()
-    }
-
-    /// How far the table turned by each row at these rates, deg.
-    fn turned(&self, rates: &[f64]) -> Vec<f64> {
-        let step = 0.5 / self.sample_hz;
-        let steps = rates.windows(2).map(|w| step * (w[0] + w[1]));
-        std::iter::once(0.0)
-            .chain(steps.scan(0.0, |sum, d| {
-                *sum += d;
-                Some(*sum)
-            }))
-            .collect()
-    }
-
-    /// Puts these rates into what a recording has of the table.
-    fn tell(&self, recording: &mut Recording, rates: Vec<f64>) {
-        if self.reference != Told::Rate {
-            recording.table_deg = Some(self.turned(&rates).iter().map(|d| d.rem_euclid(360.0)).collect());
-        }
-        recording.rate_dps = (self.reference != Told::Table).then_some(rates);
-    }
-}
-
-fn campaign(recordings: Vec<Recording>) -> Campaign {
-    let run = |recording: Recording| Run {
-        kind: RunKind::Rotation,
-        file: recording.source.clone(),
-        settle_s: 0.0,
-        role: Role::Fit,
-        amplitude: None,
-        recording,
-    };
-    Campaign { device: "made".into(), runs: recordings.into_iter().map(run).collect(), ..Campaign::default() }
-}
 
 fn identified(recordings: Vec<Recording>) -> Result<Identification, Refusal> {
     identify(campaign(recordings), &Options::default())
@@ -160,14 +48,6 @@ fn is_covered(outcome: Result<Identification, Refusal>, warning: &[&str]) -> Ide
     assert!(low <= ANGULAR_GAIN && ANGULAR_GAIN <= high && high - low < 0.02, "{:?}", r.angular_gain);
     assert!(r.warnings.iter().any(|w| warning.iter().all(|part| w.contains(part))), "{warning:?}: {:#?}", r.warnings);
     identified
-}
-
-/// Puts one value in the place of those of some rows.
-fn hold(recording: &mut Recording, rows: std::ops::Range<usize>) {
-    for v in [&mut recording.xc_v, &mut recording.yc_v].into_iter().flatten() {
-        let value = v[rows.start];
-        v[rows.clone()].fill(value);
-    }
 }
 
 // Sampling

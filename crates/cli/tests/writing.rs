@@ -5,7 +5,7 @@
 
 mod support;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -29,27 +29,50 @@ fn scenario(number: u32) -> String {
     )
 }
 
-/// Two scenarios, and what a simulation of each writes.
+/// Begins the command of that number on what lies in a folder, which writes there.
+type Begin = fn(&Path, u32, &Path) -> Child;
+
+/// Two runs of a command that write the same files, and what each of them writes.
 struct Rivals {
     folder: TempDir,
+    begin: Begin,
     whole: [BTreeMap<PathBuf, Vec<u8>>; 2],
 }
 
 impl Rivals {
+    /// Two simulations.
     fn new() -> Self {
         let folder = TempDir::new().unwrap();
-        let whole = [1, 2].map(|number| {
+        for number in [1, 2] {
             fs::write(folder.path().join(format!("{number}.toml")), scenario(number)).unwrap();
+        }
+        Self::of(folder, simulation)
+    }
+
+    /// Two campaigns identified, of one device under two names.
+    fn identified() -> Self {
+        let bench = support::Bench::small();
+        let campaign = bench.read("campaign.toml");
+        let device = campaign.lines().find(|line| line.starts_with("device")).unwrap().to_owned();
+        for number in [1, 2] {
+            let named = campaign.replace(&device, &format!("device = \"device {number}\""));
+            bench.write(&format!("{number}.toml"), named);
+        }
+        Self::of(bench.folder, identification)
+    }
+
+    fn of(folder: TempDir, begin: Begin) -> Self {
+        let whole = [1, 2].map(|number| {
             let out = folder.path().join(format!("alone {number}"));
-            assert!(simulation(folder.path(), number, &out).wait().unwrap().success());
+            assert!(begin(folder.path(), number, &out).wait().unwrap().success());
             below(&out)
         });
         assert_ne!(whole[0], whole[1], "the two can be told apart");
-        Self { folder, whole }
+        Self { folder, begin, whole }
     }
 
-    fn simulate(&self, number: u32) -> Child {
-        simulation(self.folder.path(), number, &self.out())
+    fn begin(&self, number: u32) -> Child {
+        (self.begin)(self.folder.path(), number, &self.out())
     }
 
     fn out(&self) -> PathBuf {
@@ -65,6 +88,12 @@ impl Rivals {
         })
     }
 
+    /// Names of what is unfinished beside the folder that is written, while a program moves it.
+    fn unfinished(&self) -> BTreeSet<OsString> {
+        let names = fs::read_dir(self.folder.path()).unwrap().flatten().map(|entry| entry.file_name());
+        names.filter(|name| name.to_string_lossy().contains(".cvg-")).collect()
+    }
+
     /// Names of what is unfinished, wherever it lies.
     fn leftovers(&self) -> Vec<PathBuf> {
         let is_unfinished = |path: &PathBuf| path.to_string_lossy().contains(".cvg-");
@@ -73,9 +102,17 @@ impl Rivals {
 }
 
 fn simulation(folder: &Path, number: u32, out: &Path) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_cvg"));
-    command.arg("simulate").arg(folder.join(format!("{number}.toml"))).arg("--out").arg(out);
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    begun("simulate", &folder.join(format!("{number}.toml")), out)
+}
+
+fn identification(folder: &Path, number: u32, out: &Path) -> Child {
+    begun("identify", &folder.join(format!("{number}.toml")), out)
+}
+
+fn begun(command: &str, of: &Path, out: &Path) -> Child {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_cvg"));
+    program.arg(command).arg(of).arg("--out").arg(out);
+    program.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
 /// What is below a folder, by its path from there.
@@ -94,10 +131,10 @@ fn moment(step: u32) -> f64 {
     f64::from(step.wrapping_mul(2_654_435_769) >> 16) / 65536.0
 }
 
-#[test]
-fn a_program_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_began() {
-    let rivals = Rivals::new();
-    assert!(rivals.simulate(1).wait().unwrap().success());
+/// Kills a program at the moment for which `wait` waits, of the step and how long a whole run takes, and looks at what it leaves beside
+/// what is of no set.
+fn killed(rivals: &Rivals, kills: u32, wait: impl Fn(&mut Child, u32, Duration)) {
+    assert!(rivals.begin(1).wait().unwrap().success());
     fs::create_dir(rivals.out().join("results")).unwrap();
     fs::write(rivals.out().join("results/report.json"), "mine").unwrap();
     fs::write(rivals.out().join("notes.txt"), "mine too").unwrap();
@@ -107,24 +144,43 @@ fn a_program_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_be
         (PathBuf::from("results/report.json"), b"mine".to_vec()),
     ]);
     let begun = std::time::Instant::now();
-    assert!(rivals.simulate(2).wait().unwrap().success());
+    assert!(rivals.begin(2).wait().unwrap().success());
     let whole = begun.elapsed();
-    let mut begun_and_left = 0;
-    let kills = tries(40);
+    let (mut begun_and_left, mut ended) = (0, 0);
     for step in 0..kills {
-        let mut child = rivals.simulate(1 + step % 2);
-        // every moment of a run has its turn
-        let at = whole.mul_f64(1.1 * moment(step));
-        std::thread::sleep(at);
+        let mut child = rivals.begin(1 + step % 2);
+        wait(&mut child, step, whole);
         child.kill().unwrap();
-        child.wait().unwrap();
-        assert!(rivals.is_whole(&others), "try {step}: a mixture after {at:?} of {whole:?}");
+        ended += usize::from(child.wait().unwrap().success());
+        assert!(rivals.is_whole(&others), "try {step}: a mixture");
         begun_and_left += usize::from(!rivals.leftovers().is_empty());
     }
-    println!("{begun_and_left} of {kills} left something unfinished behind");
-    assert!(rivals.simulate(1).wait().unwrap().success());
+    println!("{begun_and_left} of {kills} left something unfinished behind, {ended} had ended");
+    assert!(rivals.begin(1).wait().unwrap().success());
     assert!(rivals.is_whole(&others));
     assert_eq!(rivals.leftovers(), [] as [PathBuf; 0]);
+}
+
+#[test]
+fn a_simulation_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_began() {
+    // every moment of a run has its turn
+    killed(&Rivals::new(), tries(40), |_, step, whole| std::thread::sleep(whole.mul_f64(1.1 * moment(step))));
+}
+
+/// How long an identification writes, at the most.
+const WRITING: Duration = Duration::from_millis(8);
+
+#[test]
+fn an_identification_that_is_killed_leaves_one_set_whole_and_the_next_removes_what_it_began() {
+    let rivals = Rivals::identified();
+    killed(&rivals, tries(12), |child, step, _| {
+        // it writes at its end, and is killed anywhere from when it begins to until it is done; what others left is gone by then
+        let before = rivals.unfinished();
+        while child.try_wait().unwrap().is_none() && rivals.unfinished().is_subset(&before) {
+            std::thread::sleep(Duration::from_micros(50));
+        }
+        std::thread::sleep(WRITING.mul_f64(moment(step)));
+    });
 }
 
 #[test]
@@ -132,13 +188,13 @@ fn of_two_that_write_at_once_one_is_there_whole() {
     let rivals = Rivals::new();
     let (pairs, mut last) = (tries(10), [0; 2]);
     let begun = std::time::Instant::now();
-    assert!(rivals.simulate(1).wait().unwrap().success());
+    assert!(rivals.begin(1).wait().unwrap().success());
     let whole = begun.elapsed();
     for step in 0..pairs {
         // one begins while the other is anywhere in its run
-        let first = rivals.simulate(1 + step % 2);
+        let first = rivals.begin(1 + step % 2);
         std::thread::sleep(whole.mul_f64(moment(step)));
-        let mut both = [first, rivals.simulate(2 - step % 2)];
+        let mut both = [first, rivals.begin(2 - step % 2)];
         for child in &mut both {
             assert!(child.wait().unwrap().success());
         }
@@ -335,7 +391,7 @@ fn what_lies_there_as_a_set_half_moved_in_is_not_moved_through_a_link_or_out_of_
         fs::create_dir_all(planted.parent().unwrap()).unwrap();
         fs::write(planted, "another's").unwrap();
         let _ = symlink(&precious, rivals.out().join("linked"));
-        let _ = rivals.simulate(1).wait().unwrap();
+        let _ = rivals.begin(1).wait().unwrap();
         assert_eq!(fs::read_to_string(precious.join("file")).unwrap(), "precious");
         fs::remove_dir_all(rivals.out()).unwrap();
     }

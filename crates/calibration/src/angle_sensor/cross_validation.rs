@@ -25,13 +25,13 @@ const EDGE: f64 = 0.02;
 /// sensor that turns are nearer to one another, and beyond is a part without rows. It is much further from what is fitted than what is
 /// left out is from this factor on. Engineering choices.
 const LEAST_DISTANCE: f64 = 1.0 / 2048.0;
-const LARGEST_DISTANCE: f64 = 1.0 / 40.0;
+const LARGEST_DISTANCE: f64 = 0.25 * Gap::LEAST;
 const MUCH_FURTHER: f64 = 2.0;
 /// Numbers of sectors that are tried, and by which factor what is left out may be further from the rest than what is asked for: a few dozen
 /// stations of which every other is asked for cannot be left out so near, and without one of them a table is another. Of many stations,
 /// nearer to one another than twice this share of the period, sectors are four times as wide as what is asked for is far: two of them at
 /// least, for what the last bit makes of one may go on at the next. Engineering choices.
-const SECTORS: [usize; 6] = [20, 32, 50, 80, 128, 200];
+const SECTORS: [usize; 8] = [8, 12, 20, 32, 50, 80, 128, 200];
 const ABOUT_AS_FAR: f64 = 1.5;
 const OF_MANY_STATIONS: f64 = 1.0 / 256.0;
 const FEWEST_SECTORS: f64 = 20.0;

@@ -2,9 +2,8 @@
 
 use std::f64::consts::TAU;
 
-/// Share of the period from which on a part without rows is one that rows beside it do not bridge, where it is wider than those that are
-/// none by this factor: the last quarter of a turn that is held out is a fourth, and stations are as far apart everywhere. Engineering choices.
-const LEAST: f64 = 0.15;
+/// A part without rows is one that rows beside it do not bridge from [`Gap::LEAST`] on, where it is wider than those that are none by this
+/// factor: the last quarter of a turn that is held out is a fourth, and stations are as far apart everywhere. Engineering choices.
 const ALONE: f64 = 2.0;
 
 /// A part of the period, in periods.
@@ -20,6 +19,9 @@ pub(super) fn place(angle: f64, cycles: f64) -> f64 {
 }
 
 impl Gap {
+    /// Share of the period from which on a part without rows is a gap.
+    pub(super) const LEAST: f64 = 0.15;
+
     /// Those that these angles leave, of a period 2π/`cycles`, the widest first.
     pub(super) fn all(angles: impl Iterator<Item = f64>, cycles: f64) -> Vec<Self> {
         let mut places: Vec<f64> = angles.map(|a| place(a, cycles)).collect();
@@ -31,7 +33,7 @@ impl Gap {
         parts.sort_by(|a, b| b.width.total_cmp(&a.width));
         let are_gaps = |count: &usize| {
             let next = parts.get(*count).map_or(f64::INFINITY, |part| ALONE * part.width);
-            parts[count - 1].width >= LEAST && parts[count - 1].width > next
+            parts[count - 1].width >= Self::LEAST && parts[count - 1].width > next
         };
         let count = (1..=parts.len()).filter(are_gaps).max().unwrap_or(0);
         parts.truncate(count);

@@ -17,6 +17,8 @@ use crate::report::{Input, Tool};
 
 /// Identifier of the format.
 pub const SCHEMA: &str = "cvg.calibration/1";
+/// Periods that a vibration's angle and a sensor's have, deg.
+const PERIODS_DEG: [f64; 2] = [180.0, 360.0];
 /// What the last line starts with.
 const CHECKSUM: &str = "checksum = \"crc32:";
 
@@ -206,6 +208,9 @@ impl Calibration {
             "sensor" => Instrument::Sensor,
             other => return refuse(format!("unknown instrument \"{other}\""), "gyroscope or sensor"),
         };
+        if !PERIODS_DEG.contains(&file.period_deg) {
+            return refuse(format!("its angle has a period of {} deg", file.period_deg), "180 or 360");
+        }
         let mut hypothesis =
             Hypothesis::ideal(instrument, file.period_deg.to_radians(), file.angular_gain.unwrap_or(1.0));
         hypothesis.follows_input = file.follows_input;

@@ -54,7 +54,7 @@ pub(crate) fn report(campaign: &Path) -> Value {
 
 /// A folder with a campaign in it.
 pub(crate) struct Bench {
-    folder: TempDir,
+    pub(crate) folder: TempDir,
 }
 
 impl Bench {
