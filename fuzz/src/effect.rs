@@ -23,8 +23,13 @@ pub fn run(bytes: &[u8]) {
             warmer_k: b,
             drive: AxisForces { x_c: b, x_s: a, y_c: a, y_s: b },
         };
-        let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b });
-        std::hint::black_box((effect.read(&p, e, &at), effect.unread(&p, e, &at), effect.mechanics(&p, &e), forces));
+        let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b }, &at);
+        std::hint::black_box((
+            effect.read(&p, e, &at),
+            effect.unread(&p, e, &at),
+            effect.mechanics(&p, &e, &at),
+            forces,
+        ));
         std::hint::black_box(effect.input_rate(&p, a, &at));
     }
 }

@@ -25,7 +25,7 @@ fn readout_error(effect: EffectId, v: &Values<f64>, a: f64, theta: f64, at: &Mom
 /// dθ_b/dθ · (−kΩ) = θ̇ + kΩ to first order in the effect.
 fn precession_error_slope(effect: EffectId, v: &Values<f64>, a: f64, theta: f64, k_omega: f64) -> f64 {
     let e = line(a, theta);
-    let rate = coriolis(k_omega, &e) + effect.mechanics(v, &e);
+    let rate = coriolis(k_omega, &e) + effect.mechanics(v, &e, &Moment::default());
     (e.precession(&rate) + k_omega) / -k_omega
 }
 
@@ -38,7 +38,7 @@ fn slope(y: impl Fn(f64) -> f64, x: f64) -> f64 {
 /// Orbit forces that a commanded `v_as` becomes at `theta` when the drive has this effect and unit gains.
 fn driven(effect: EffectId, v: &Values<f64>, v_as: f64, theta: f64) -> OrbitForces<f64> {
     let commanded = ActuationGains { x: 1.0, y: 1.0 }.axis_forces(&ControlOutputs { v_as, v_qc: 0.0 }, theta);
-    effect.actuate(v, commanded).along_orbit(theta)
+    effect.actuate(v, commanded, &Moment::default()).along_orbit(theta)
 }
 
 /// Small effect sizes of either sign.
@@ -198,7 +198,7 @@ proptest! {
     ) {
         let (delta, axis) = (c.hypot(s), 0.5 * s.atan2(c));
         let e = line(a, theta);
-        let extra = e.pendulum_rate(&EffectId::Anisodamping.mechanics(&values(&[c, s]), &e)).e;
+        let extra = e.pendulum_rate(&EffectId::Anisodamping.mechanics(&values(&[c, s]), &e, &Moment::default())).e;
         let mean = -2.0 / tau_s * a * a;
         prop_assert_near!(extra / mean, 0.5 * delta * tau_s * (2.0 * (theta - axis)).cos(), 1e-13 * tau_s);
     }
@@ -209,7 +209,7 @@ proptest! {
     ) {
         let (delta, axis) = (c.hypot(s), 0.5 * s.atan2(c));
         let e = line(a, theta);
-        let rate = EffectId::Anisoelasticity.mechanics(&values(&[c, s]), &e);
+        let rate = EffectId::Anisoelasticity.mechanics(&values(&[c, s]), &e, &Moment::default());
         prop_assert_near!(e.pendulum_rate(&rate).q, -delta * a * a * (2.0 * (theta - axis)).sin(), 1e-13 * a * a);
         prop_assert_near!(e.precession(&rate), 0.0, 1e-14);
     }
@@ -222,7 +222,7 @@ proptest! {
         let e = cvg_model::Orbit { a, q: a * q, theta, delta: 0.0 }.envelope();
         let p = e.pendulum();
         let expected = 0.5 * delta * p.q / p.r.hypot(p.s) * (2.0 * (theta - axis)).cos();
-        prop_assert_near!(e.precession(&EffectId::Anisoelasticity.mechanics(&values(&[c, s]), &e)), expected, 1e-13);
+        prop_assert_near!(e.precession(&EffectId::Anisoelasticity.mechanics(&values(&[c, s]), &e, &Moment::default())), expected, 1e-13);
     }
 
     /// θ̇ = p sin(4θ + phase) integrates to p/(4kΩ) cos(4θ + phase).
@@ -270,7 +270,7 @@ proptest! {
     fn prop_a_phase_of_the_drives_turns_what_holds_the_quadrature(phase in small(), v_qc in -1.0..1.0_f64, theta in angles()) {
         let commanded = ActuationGains { x: 1.0, y: 1.0 }.axis_forces(&ControlOutputs { v_as: 0.0, v_qc }, theta);
         let held = commanded.along_orbit(theta).q_c;
-        let f = EffectId::ActuationPhase.actuate(&values(&[phase]), commanded).along_orbit(theta);
+        let f = EffectId::ActuationPhase.actuate(&values(&[phase]), commanded, &Moment::default()).along_orbit(theta);
         prop_assert_near!(f.q_s, -phase * held, 1e-9);
         prop_assert_near!(f.a_s, 0.0, 1e-14);
     }
@@ -302,7 +302,7 @@ proptest! {
     fn prop_both_phases_of_a_drive_saturate_together(over in 1.1..3.0_f64, phase in angles()) {
         let (sin, cos) = phase.sin_cos();
         let f = cvg_model::AxisForces { x_c: over * cos, x_s: over * sin, y_c: 0.0, y_s: 0.0 };
-        let out = EffectId::DriveSaturation.actuate(&values(&[1.0]), f);
+        let out = EffectId::DriveSaturation.actuate(&values(&[1.0]), f, &Moment::default());
         let r = 1.0 / over;
         prop_assert_near!(out.x_c.hypot(out.x_s), over * 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt()), 1e-12);
         prop_assert_near!(out.x_c * f.x_s - out.x_s * f.x_c, 0.0, 1e-12);
@@ -314,7 +314,7 @@ proptest! {
         step in 1e-3..1.0_f64, x_c in -9.0..9.0_f64, x_s in -9.0..9.0_f64, y_c in -9.0..9.0_f64, y_s in -9.0..9.0_f64,
     ) {
         let f = cvg_model::AxisForces { x_c, x_s, y_c, y_s };
-        let out = EffectId::DriveQuantisation.actuate(&values(&[step]), f);
+        let out = EffectId::DriveQuantisation.actuate(&values(&[step]), f, &Moment::default());
         for (out, f) in [(out.x_c, x_c), (out.x_s, x_s), (out.y_c, y_c), (out.y_s, y_s)] {
             prop_assert_near!(out / step, (out / step).round(), 1e-8);
             prop_assert!((out - f).abs() <= 0.5 * step * (1.0 + 1e-8), "{out} of {f}");
@@ -430,7 +430,8 @@ fn paper_anisodamping_of_4_7_mhz_bends_the_angle_by_10_mdeg_at_500_dps_and_100_m
         let mut bias = Vec::new();
         for _ in 0..=steps {
             bias.push(turned);
-            let f = |e: &Envelope<f64>| coriolis(k_omega, e) + EffectId::Anisodamping.mechanics(&v, e);
+            let f =
+                |e: &Envelope<f64>| coriolis(k_omega, e) + EffectId::Anisodamping.mechanics(&v, e, &Moment::default());
             let before = e.pendulum().angle();
             let half = e + f(&e) * (0.5 * dt);
             e = e + f(&half) * dt;

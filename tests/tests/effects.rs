@@ -11,7 +11,7 @@ use cvg_tests::tolerances::{CUBIC_INVERSE, INVERSE};
 use proptest::prelude::*;
 
 /// Every identifier that campaigns, calibrations and reports may name.
-const IDS: [&str; 26] = [
+const IDS: [&str; 32] = [
     "detection-gain-mismatch",
     "detection-phase",
     "detection-skew",
@@ -25,6 +25,12 @@ const IDS: [&str; 26] = [
     "temperature",
     "skew-temperature",
     "scale-temperature",
+    "cubic-temperature",
+    "detection-offset-temperature",
+    "anisodamping-temperature",
+    "anisoelasticity-temperature",
+    "actuation-gain-temperature",
+    "actuation-skew-temperature",
     "actuation-gain-mismatch",
     "actuation-skew",
     "actuation-phase",
@@ -150,8 +156,8 @@ for_each_scalar! {
             let neutral = effect.neutral::<T>();
             prop_assert_eq!(widened(&effect.read(&neutral, e, &at)), e64, "{}", effect);
             prop_assert_eq!(widened(&effect.unread(&neutral, e, &at)), e64, "{}", effect);
-            prop_assert_eq!(effect.mechanics(&neutral, &e).pendulum().e, 0.0, "{}", effect);
-            prop_assert_eq!(effect.actuate(&neutral, f), f, "{}", effect);
+            prop_assert_eq!(effect.mechanics(&neutral, &e, &at).pendulum().e, 0.0, "{}", effect);
+            prop_assert_eq!(effect.actuate(&neutral, f, &at), f, "{}", effect);
             prop_assert_eq!(effect.input_rate(&neutral, rate, &at), rate, "{}", effect);
         }
     }
@@ -166,7 +172,7 @@ for_each_scalar! {
                 *v = T::from_f64((p.neutral + p.scale * size).clamp(p.lower, p.upper));
             }
             for e in [
-                effect.mechanics(&v, &rest),
+                effect.mechanics(&v, &rest, &Moment::default()),
                 effect.read(&v, rest, &Moment::default()),
                 effect.unread(&v, rest, &Moment::default()),
             ] {

@@ -3,7 +3,7 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use cvg_controller::{ActuationCompensation, Allocation, OrbitCommands, Status};
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Moment};
 use cvg_model::{ActuationGains, ControlOutputs, Orbit};
 use cvg_tests::domain::{actuation_gains, angles, outputs, ratios, sizes};
 use cvg_tests::scalar::rounded;
@@ -95,7 +95,7 @@ for_each_scalar! {
         let (sin, cos) = cvg_model::Real::sin_cos(theta);
         let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin);
         prop_assert_eq!(drive.status, Status::Within);
-        let f = effects.iter().fold(drive.volts, |f, (id, values)| id.actuate(values, f)).along_orbit(theta);
+        let f = effects.iter().fold(drive.volts, |f, (id, values)| id.actuate(values, f, &Moment::origin())).along_orbit(theta);
         let tolerance = T::tolerance(&ALLOCATION) * ratio.max(1.0 / ratio);
         for (made, commanded) in [(f.a_s, v_as), (f.q_s, v_qs), (f.q_c, v_qc), (f.a_c, v_ac)] {
             prop_assert_near!(made.to_f64(), commanded.to_f64(), tolerance);

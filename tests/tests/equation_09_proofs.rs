@@ -1,7 +1,7 @@
 //! Equation 9, proved: for all reals on the shipping source, and with rounding for all inputs of a box.
 
 use cvg_controller::{ActuationCompensation, Allocation, OrbitCommands, Status};
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Moment};
 use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float, Orbit, Real};
 use cvg_prover::{Exact, Formula, Interval, Proof, Refusal};
 use cvg_tests::domain::{any_angle, any_vector, octave};
@@ -174,7 +174,7 @@ fn the_compensated_allocation_makes_what_was_commanded(
             proof.outside(LIMITED);
             return Ok(());
         }
-        let f = EffectId::ActuationGainMismatch.actuate(&values, drive.volts).along_orbit(theta);
+        let f = EffectId::ActuationGainMismatch.actuate(&values, drive.volts, &Moment::origin()).along_orbit(theta);
         proof.equal("f_as", f.a_s, planted * v_as)?;
         proof.equal("f_qs", f.q_s, planted * v_qs)?;
         proof.equal("f_qc", f.q_c, planted * v_qc)?;

@@ -68,8 +68,12 @@ fn free(resonator: &Resonator<f64>, start: &Orbit<f64>, rate_rad_s: f64, time_s:
         for _ in 0..per_window {
             carrier.step([0.0; 2], [0.0; 2]);
         }
-        envelope =
-            envelope_plant.step(&envelope, &cvg_model::AxisForces { x_c: 0.0, x_s: 0.0, y_c: 0.0, y_s: 0.0 }, 0.0);
+        envelope = envelope_plant.step(
+            &envelope,
+            &cvg_model::AxisForces { x_c: 0.0, x_s: 0.0, y_c: 0.0, y_s: 0.0 },
+            0.0,
+            &cvg_model::effects::Moment::origin(),
+        );
         averages = advanced(resonator, &averages, rate_rad_s, window);
         let of = |p: cvg_model::Pendulum<f64>| Seen { e: p.e, q: p.q, theta: p.angle() };
         let (a, b) = (of(carrier.vibration().pendulum()), of(envelope.pendulum()));

@@ -40,7 +40,7 @@ pub(crate) fn effects(effect: Option<&str>, as_json: bool, as_markdown: bool) ->
 }
 
 fn listed(id: &str, stage: &str, title: &str) -> String {
-    format!("{id:<25}{stage:<11}{title}\n")
+    format!("{id:<30}{stage:<11}{title}\n")
 }
 
 /// The library as JSON.
@@ -184,7 +184,7 @@ fn coded(names: &[(&str, &str)]) -> String {
 fn page() -> String {
     let mut s = String::from(
         "# Effects\n\nWhat a recording can hold. This page is printed by `cvg effects --markdown` from\n\
-         `crates/model/src/effects`, one file per effect; a test compares the two. `cvg effects ID` shows one in full.\n\n\
+         `crates/model/src/effects`, one file per effect, with what of it may follow the temperature; a test compares the two.\n`cvg effects ID` shows one in full.\n\n\
          An effect acts in one of four stages: on the **input** rotation, in the **mechanics**, in the **actuation**, or in \
          the\n**readout**. `a` is the amplitude, θ the pattern angle, α the angle of the table, k the angular gain, Ω the \
          rate. Signatures\nare for small effects.\n\n\
@@ -236,6 +236,7 @@ At one rate and one amplitude the following cannot be told apart:
 
 - `detection-gain-mismatch`, and the sine part of `anisodamping`;
 - `detection-skew`, and the cosine part of `anisodamping`;
+- `temperature`, and the sine part of `anisodamping-temperature`; `skew-temperature`, and its cosine part;
 - `detection-cubic`, and `spring-cubic`;
 - the difference part of `detection-cubic`, and `detection-gain-mismatch`;
 - `detection-cubic`, and `detection-quintic`, which is reported as a cubic;

@@ -3,7 +3,7 @@
 //!
 //! It refuses to find the direction: it takes its cosine and sine.
 
-use cvg_model::effects::{EffectId, MAX_PARAMETERS, Stage, Values};
+use cvg_model::effects::{EffectId, MAX_PARAMETERS, Moment, Stage, Values};
 use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float};
 
 use crate::{ConfigError, Status, positive};
@@ -63,9 +63,10 @@ impl<T: Float> ActuationCompensation<T> {
         for (id, values) in effects {
             check(*id, values)?;
         }
+        let at = Moment::origin();
         let through = |unit: AxisForces<T>| {
             EffectId::ALL.iter().fold(unit, |f, id| {
-                effects.iter().filter(|(e, _)| e == id).fold(f, |f, (e, values)| e.actuate(values, f))
+                effects.iter().filter(|(e, _)| e == id).fold(f, |f, (e, values)| e.actuate(values, f, &at))
             })
         };
         let (zero, one) = (T::zero(), T::one());
@@ -252,6 +253,9 @@ fn check<T: Float>(id: EffectId, values: &Values<T>) -> Result<(), ConfigError> 
     let description = id.description();
     if description.stage != Stage::Actuation || !id.in_library() {
         return Err(ConfigError { parameter: description.id, expected: "an effect of the actuation" });
+    }
+    if id.by_temperature() {
+        return Err(ConfigError { parameter: description.id, expected: "free of what is told by a thermometer" });
     }
     if id.limits_drives() && *values != id.neutral() {
         return Err(ConfigError {

@@ -2,7 +2,7 @@
 
 use approx::assert_abs_diff_eq;
 use cvg_controller::{ActuationCompensation, Allocation, Heading, OrbitCommands, PiState, RateLoop, Status};
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Moment};
 use cvg_model::{ActuationGains, AxisForces, ControlOutputs, Float, Orbit, Pendulum};
 use proptest::prelude::*;
 
@@ -33,6 +33,13 @@ fn drives_that_saturate_are_no_matrix_to_be_inverted() {
         ActuationCompensation::new(&effects).map(|_| ()).map_err(|e| e.parameter)
     };
     assert_eq!((new(0.0), new(0.1)), (Ok(()), Err("drive-saturation")));
+}
+
+#[test]
+fn drives_that_follow_a_thermometer_are_undone_by_nobody_who_has_none() {
+    let effects = [(EffectId::ActuationGainTemperature, [1e-3, 0.0, 0.0, 0.0])];
+    let refused = ActuationCompensation::new(&effects).map(|_| ()).map_err(|e| e.parameter);
+    assert_eq!(refused, Err("actuation-gain-temperature"));
 }
 
 #[test]
@@ -375,7 +382,7 @@ proptest! {
         let (sin, cos) = theta.sin_cos();
         let drive = allocation.step(&OrbitCommands { v_as, v_qs, v_qc, v_ac }, cos, sin).volts;
         // the drives act in the library's order: gains, skew, phase
-        let forces = effects.iter().rev().fold(drive, |f, (id, values)| id.actuate(values, f)).along_orbit(theta);
+        let forces = effects.iter().rev().fold(drive, |f, (id, values)| id.actuate(values, f, &Moment::origin())).along_orbit(theta);
         prop_assert!((forces.a_s - v_as).abs() < 1e-12);
         prop_assert!((forces.q_s - v_qs).abs() < 1e-12);
         prop_assert!((forces.q_c - v_qc).abs() < 1e-12);

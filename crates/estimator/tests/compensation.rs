@@ -20,6 +20,8 @@ fn reasonable(id: EffectId, unit: [f64; 4]) -> Values<f64> {
         "drive-feedthrough" => unit.map(|u| 0.1 * u),
         "detection-gain-mismatch" => [1.0 + 0.4 * u, 0.0, 0.0, 0.0],
         "temperature" | "skew-temperature" => [1e-3 * u, 0.0, 0.0, 0.0],
+        "cubic-temperature" => [2e-3 * u, 0.0, 0.0, 0.0],
+        "detection-offset-temperature" => [1e-3 * u, 1e-3 * v, 0.0, 0.0],
         "gain-drift" => [1e-3 * u, 0.0, 0.0, 0.0],
         "detection-offset" => [0.5 * u, 0.5 * v, 0.0, 0.0],
         // from no clipping to a carrier three times over the clip level

@@ -40,6 +40,8 @@ fn what_follows_the_time_or_the_temperature_says_so() {
         let follows = |other: Moment<f64>| {
             id.read(&values, VIBRATION, &now()) != id.read(&values, VIBRATION, &other)
                 || id.input_rate(&values, 0.5, &now()) != id.input_rate(&values, 0.5, &other)
+                || id.mechanics(&values, &VIBRATION, &now()) != id.mechanics(&values, &VIBRATION, &other)
+                || id.actuate(&values, now().drive, &now()) != id.actuate(&values, now().drive, &other)
         };
         assert_eq!(id.in_time(), follows(Moment { t_s: 4.0, ..now() }), "{id}");
         assert_eq!(id.by_temperature(), follows(Moment { warmer_k: -3.0, ..now() }), "{id}");
@@ -58,16 +60,16 @@ fn a_moment_is_mapped_number_by_number() {
 fn drives_act_on_both_phases_alike() {
     let f = AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.0, y_s: 0.25 };
     // gains of 2 and ½
-    let uneven = EffectId::ActuationGainMismatch.actuate(&[4.0, 0.0, 0.0, 0.0], f);
+    let uneven = EffectId::ActuationGainMismatch.actuate(&[4.0, 0.0, 0.0, 0.0], f, &now());
     assert_eq!(uneven, AxisForces { x_c: 1.0, x_s: -4.0, y_c: 1.5, y_s: 0.125 });
-    let skewed = EffectId::ActuationSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f);
+    let skewed = EffectId::ActuationSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f, &now());
     assert_eq!(skewed, AxisForces { x_c: 0.5, x_s: -2.0, y_c: 3.25, y_s: -0.75 });
     // a quarter of a turn: F_s + iF_c becomes −F_c + iF_s
-    let late = EffectId::ActuationPhase.actuate(&[core::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0], f);
+    let late = EffectId::ActuationPhase.actuate(&[core::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0], f, &now());
     for (got, expected) in [(late.x_c, -2.0), (late.x_s, -0.5), (late.y_c, 0.25), (late.y_s, -3.0)] {
         assert!((got - expected).abs() < 1e-15, "{late:?}");
     }
-    assert_eq!(EffectId::DetectionSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f), f, "a readout makes no forces");
+    assert_eq!(EffectId::DetectionSkew.actuate(&[0.5, 0.0, 0.0, 0.0], f, &now()), f, "a readout makes no forces");
 }
 
 #[test]
@@ -138,14 +140,17 @@ fn a_clipped_carrier_is_scaled_by_its_describing_function() {
     }
     // each drive by its own level, as each channel
     let f = AxisForces { x_c: 3.0, x_s: 4.0, y_c: 0.3, y_s: -0.4 };
-    let clipped = EffectId::DriveSaturation.actuate(&[0.4, 0.0, 0.0, 0.0], f);
+    let clipped = EffectId::DriveSaturation.actuate(&[0.4, 0.0, 0.0, 0.0], f, &now());
     let r: f64 = 1.0 / (0.4 * 5.0);
     let by = 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt());
     assert_abs_diff_eq!(clipped.x_c, 3.0 * by, epsilon = 1e-14);
     assert_abs_diff_eq!(clipped.x_s, 4.0 * by, epsilon = 1e-14);
     assert_eq!((clipped.y_c, clipped.y_s), (0.3, -0.4));
-    let clipped = EffectId::DriveSaturation
-        .actuate(&[0.4, 0.0, 0.0, 0.0], AxisForces { x_c: 0.3, x_s: -0.4, y_c: -4.0, y_s: 3.0 });
+    let clipped = EffectId::DriveSaturation.actuate(
+        &[0.4, 0.0, 0.0, 0.0],
+        AxisForces { x_c: 0.3, x_s: -0.4, y_c: -4.0, y_s: 3.0 },
+        &now(),
+    );
     assert_eq!((clipped.x_c, clipped.x_s), (0.3, -0.4));
     assert_abs_diff_eq!(clipped.y_c, -4.0 * by, epsilon = 1e-14);
     assert_abs_diff_eq!(clipped.y_s, 3.0 * by, epsilon = 1e-14);
@@ -156,7 +161,8 @@ fn a_clipped_carrier_is_scaled_by_its_describing_function() {
 
 #[test]
 fn a_drive_of_few_steps_puts_out_whole_ones_in_either_phase() {
-    let put_out = |step: f64, f: AxisForces<f64>| EffectId::DriveQuantisation.actuate(&[step, 0.0, 0.0, 0.0], f);
+    let put_out =
+        |step: f64, f: AxisForces<f64>| EffectId::DriveQuantisation.actuate(&[step, 0.0, 0.0, 0.0], f, &now());
     let f = put_out(0.2, AxisForces { x_c: 0.29, x_s: -0.31, y_c: 0.09, y_s: -7.12 });
     assert_abs_diff_eq!(f.x_c, 0.2, epsilon = 1e-15);
     assert_abs_diff_eq!(f.x_s, -0.4, epsilon = 1e-15);
@@ -247,24 +253,24 @@ fn the_mechanics_move_the_envelope_as_averaged() {
         -0.5 * (s * x_c - c * y_c),
         -0.5 * (s * x_s - c * y_s),
     );
-    assert_near(EffectId::Anisodamping.mechanics(&[c, s, 0.0, 0.0], &VIBRATION), damped);
+    assert_near(EffectId::Anisodamping.mechanics(&[c, s, 0.0, 0.0], &VIBRATION, &now()), damped);
     // i(x_c − i x_s) = x_s + i x_c: the same a quarter of a period ahead
     let sprung = Envelope::new(damped.x_s, -damped.x_c, damped.y_s, -damped.y_c);
-    assert_near(EffectId::Anisoelasticity.mechanics(&[c, s, 0.0, 0.0], &VIBRATION), sprung);
-    assert_eq!(EffectId::DetectionSkew.mechanics(&[c, 0.0, 0.0, 0.0], &VIBRATION), Envelope::zero());
+    assert_near(EffectId::Anisoelasticity.mechanics(&[c, s, 0.0, 0.0], &VIBRATION, &now()), sprung);
+    assert_eq!(EffectId::DetectionSkew.mechanics(&[c, 0.0, 0.0, 0.0], &VIBRATION, &now()), Envelope::zero());
 }
 
 #[test]
 fn a_cubic_spring_precesses_at_four_times_the_angle() {
     for theta in [0.1, 0.4, 1.0, -0.7, FRAC_PI_2] {
         let e = Orbit { a: 0.8, q: 0.1, theta, delta: 0.2 }.envelope();
-        let rate = EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &e);
+        let rate = EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &e, &now());
         let expected = 0.3 * (4.0 * theta).sin() - 0.2 * (4.0 * theta).cos();
         assert_abs_diff_eq!(e.precession(&rate), expected, epsilon = 1e-14);
         assert_abs_diff_eq!(e.pendulum_rate(&rate).e, 0.0, epsilon = 1e-15);
     }
     for no_orientation in [Envelope::zero(), Envelope::new(1.0, 0.0, 0.0, 1.0)] {
-        assert_eq!(EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &no_orientation), Envelope::zero());
+        assert_eq!(EffectId::SpringCubic.mechanics(&[0.3, -0.2, 0.0, 0.0], &no_orientation, &now()), Envelope::zero());
     }
 }
 
@@ -316,7 +322,7 @@ fn shift(id: EffectId, amplitude: f64, precession_rad_s: f64) -> f64 {
             *value += 0.1 * p.scale;
         }
     }
-    let at = Moment { t_s: 3.0, table_rad: 0.4, precession_rad_s, ..Moment::default() };
+    let at = Moment { t_s: 3.0, table_rad: 0.4, precession_rad_s, warmer_k: 10.0, ..Moment::default() };
     let angles = (0..24).map(|i| (f64::from(i) + 0.5) * core::f64::consts::PI / 24.0);
     let squares = angles.map(|theta| {
         let (sin, cos) = theta.sin_cos();
@@ -418,13 +424,21 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         all.filter(|d| d.stage == stage && listed.contains(&d.id)).map(|d| d.id).collect()
     };
     // converters, amplifiers, then axes
-    let drives =
-        ["drive-quantisation", "drive-saturation", "actuation-gain-mismatch", "actuation-skew", "actuation-phase"];
+    let drives = [
+        "drive-quantisation",
+        "drive-saturation",
+        "actuation-gain-mismatch",
+        "actuation-gain-temperature",
+        "actuation-skew",
+        "actuation-skew-temperature",
+        "actuation-phase",
+    ];
     assert_eq!(at(Stage::Actuation, &drives), drives);
     // what is added to the angle of the vibration, then plates, axes, amplifier, and the converter
     let angle = ["harmonic-n", "time-periodic", "angle-latency"];
     let channels = [
         "detection-cubic",
+        "cubic-temperature",
         "detection-quintic",
         "detection-skew",
         "skew-temperature",
@@ -434,6 +448,7 @@ fn readout_effects_stand_in_the_order_in_which_a_signal_meets_them() {
         "detection-phase",
         "drive-feedthrough",
         "detection-offset",
+        "detection-offset-temperature",
         "detection-saturation",
     ];
     let listed = [&angle[..], &channels].concat();
@@ -495,6 +510,37 @@ fn a_channel_reads_its_drive_by_a_complex_factor() {
     assert_near(lagged, Envelope::new(0.0, 0.3, 0.0, 0.0));
 }
 
+/// Beside the effect at its values for the temperature that parameters refer to, what follows it is the effect at those of the moment: a sum,
+/// or, of gain ratios, a product.
+#[test]
+fn what_follows_the_temperature_is_the_effect_with_slopes_in_the_place_of_its_parameters() {
+    use EffectId as E;
+    let pairs = [
+        (E::DetectionGainMismatch, E::Temperature, 1.02),
+        (E::DetectionSkew, E::SkewTemperature, 0.02),
+        (E::DetectionCubic, E::CubicTemperature, 0.0),
+        (E::DetectionOffset, E::DetectionOffsetTemperature, 0.02),
+        (E::Anisodamping, E::AnisodampingTemperature, 0.02),
+        (E::Anisoelasticity, E::AnisoelasticityTemperature, 0.02),
+        (E::ActuationGainMismatch, E::ActuationGainTemperature, 1.02),
+        (E::ActuationSkew, E::ActuationSkewTemperature, 0.02),
+    ];
+    for (id, followed, constant) in pairs {
+        let (at, slope) = (now(), 1e-3);
+        let change = slope * at.warmer_k;
+        let whole = if constant > 1.0 { constant * (1.0 + change) } else { constant + change };
+        let one = |v: f64| [v, 0.0, 0.0, 0.0];
+        let (whole, constant, slope) = (one(whole), one(constant), one(slope));
+        assert_near(followed.read(&slope, id.read(&constant, VIBRATION, &at), &at), id.read(&whole, VIBRATION, &at));
+        let moved = id.mechanics(&constant, &VIBRATION, &at) + followed.mechanics(&slope, &VIBRATION, &at);
+        assert_near(moved, id.mechanics(&whole, &VIBRATION, &at));
+        let (pushed, expected) =
+            (followed.actuate(&slope, id.actuate(&constant, at.drive, &at), &at), id.actuate(&whole, at.drive, &at));
+        let as_envelope = |f: AxisForces<f64>| Envelope::new(f.x_c, f.x_s, f.y_c, f.y_s);
+        assert_near(as_envelope(pushed), as_envelope(expected));
+    }
+}
+
 #[test]
 fn what_is_made_of_commands_says_so() {
     let made: Vec<_> = EffectId::ALL.iter().filter(|id| id.on_commands()).collect();
@@ -510,7 +556,8 @@ fn what_is_made_of_commands_says_so() {
 
 /// What a loop nulls in its own channel shows in what it commands, and nowhere else.
 #[test]
-fn a_lag_between_the_channels_alone_is_seen_by_the_loops_alone() {
+fn a_lag_between_the_channels_and_a_split_that_changes_alone_are_seen_by_the_loops_alone() {
     let seen: Vec<_> = EffectId::ALL.iter().filter(|id| id.seen_by_loops()).collect();
-    assert_eq!(seen, [&EffectId::DetectionPhase, &EffectId::DriveFeedthrough]);
+    let split = EffectId::AnisoelasticityTemperature;
+    assert_eq!(seen, [&split, &EffectId::DetectionPhase, &EffectId::DriveFeedthrough]);
 }

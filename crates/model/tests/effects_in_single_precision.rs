@@ -28,6 +28,7 @@ fn values(id: EffectId) -> Vec<Values<f64>> {
             [-0.08, 0.03, 0.0, 0.0],
             [0.02, -0.06, 0.0, 0.0],
         ],
+        EffectId::CubicTemperature => &[[0.0; 4], [1e-3, 0.0, 0.0, 0.0], [-0.01, 0.0, 0.0, 0.0]],
         EffectId::DriveFeedthrough => &[[0.3, -0.2, -0.1, 0.4], [0.0, 0.0, 0.2, -0.3]],
         EffectId::DetectionSaturation | EffectId::DriveSaturation => {
             &[[0.0; 4], [0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.3, 0.0, 0.0, 0.0]]
@@ -105,11 +106,17 @@ fn what_is_moved_pushed_and_turned_is_that_of_double_precision() {
             let values = in_single.map(f64::from);
             for e in vibrations() {
                 let e = double(&single(&e));
-                near(&id.mechanics(&in_single, &single(&e)), &id.mechanics(&values, &e), id.description().id);
+                let at = moments()[0];
+                let now = at.map(|v| v as f32);
+                near(
+                    &id.mechanics(&in_single, &single(&e), &now),
+                    &id.mechanics(&values, &e, &at),
+                    id.description().id,
+                );
                 let f = |e: &Envelope<f64>| AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s };
                 let s = single(&e);
-                let got = id.actuate(&in_single, AxisForces { x_c: s.x_c, x_s: s.x_s, y_c: s.y_c, y_s: s.y_s });
-                let pushed = id.actuate(&values, f(&e));
+                let got = id.actuate(&in_single, AxisForces { x_c: s.x_c, x_s: s.x_s, y_c: s.y_c, y_s: s.y_s }, &now);
+                let pushed = id.actuate(&values, f(&e), &at);
                 near(
                     &Envelope::new(got.x_c, got.x_s, got.y_c, got.y_s),
                     &Envelope::new(pushed.x_c, pushed.x_s, pushed.y_c, pushed.y_s),

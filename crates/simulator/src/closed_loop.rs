@@ -358,10 +358,10 @@ impl ClosedLoop {
         [x_c + n.x_c, x_s + n.x_s, y_c + n.y_c, y_s + n.y_s]
     }
 
-    /// What drives that saturate put out.
+    /// What drives that saturate or follow the temperature put out.
     #[inline(never)]
-    fn limited(&self, drive: AxisForces<f64>) -> AxisForces<f64> {
-        self.design.stages.limited(drive)
+    fn limited(&self, drive: AxisForces<f64>, at: &Moment<f64>) -> AxisForces<f64> {
+        self.design.stages.limited(drive, at)
     }
 
     /// The mechanics to the next sample, and the reference phase with it.
@@ -375,7 +375,7 @@ impl ClosedLoop {
         } else {
             *drive
         };
-        let drive = if self.design.stages.limiting.is_empty() { drive } else { self.limited(drive) };
+        let drive = if self.design.stages.limiting.is_empty() { drive } else { self.limited(drive, at) };
         let (table, input) = if self.rate_is_nominal {
             (nominal, nominal)
         } else {
@@ -392,7 +392,7 @@ impl ClosedLoop {
         let psi = self.seen.correction_rad_s * period;
         let turned = reference_ahead(&Envelope::new(drive.x_c, drive.x_s, drive.y_c, drive.y_s), -0.5 * psi);
         let drive = AxisForces { x_c: turned.x_c, x_s: turned.x_s, y_c: turned.y_c, y_s: turned.y_s };
-        let moved = self.leg.plant.step(&self.vibration, &drive, input - nominal);
+        let moved = self.leg.plant.step(&self.vibration, &drive, input - nominal, at);
         self.vibration = reference_ahead(&moved, psi);
         self.table_rad += table * period;
     }

@@ -6,11 +6,12 @@
 //!   \begin{pmatrix}\Phi&\Gamma\\0&1\end{pmatrix} = \exp\left[\begin{pmatrix}A&B\\0&0\end{pmatrix}T\right],$$
 //!
 //! computed once for a rate and a period: a step is 4×8 multiplications and additions, and its only error is rounding.
-//! What the matrix cannot hold (a rate that deviates from the nominal one, nonlinear mechanics) acts in half steps on
+//! What the matrix cannot hold (a rate that deviates from the nominal one, mechanics that are nonlinear or follow the temperature) acts in half steps on
 //! either side of it (Strang splitting, error of third order in the step).
 //!
 //! It refuses to know time: whoever steps it says what the rate deviation is.
 
+use cvg_model::effects::Moment;
 use cvg_model::resonator::Resonator;
 use cvg_model::{AxisForces, Envelope, Real};
 use nalgebra::SMatrix;
@@ -86,7 +87,7 @@ impl Plant {
     ) -> Self {
         let linear = |e: &Envelope<f64>| {
             let free = resonator.envelope_rate(e, rate_rad_s, ahead_rad_s);
-            stages.linear.iter().fold(free, |sum, (id, v)| sum + id.mechanics(v, e))
+            stages.linear.iter().fold(free, |sum, (id, v)| sum + id.mechanics(v, e, &Moment::origin()))
         };
         let drive = |v: &AxisForces<f64>| stages.actuate(*v).envelope_rate(1.0 / drive_per_s_v);
         Self {
@@ -99,27 +100,39 @@ impl Plant {
     }
 
     /// The envelope one period after `z`, drives held at `v`, the rate `deviation_rad_s` off the nominal one (its mean
-    /// over the period).
+    /// over the period), `at` the moment of what changes.
     #[inline]
-    pub fn step(&self, z: &Envelope<f64>, v: &AxisForces<f64>, deviation_rad_s: f64) -> Envelope<f64> {
+    pub fn step(
+        &self,
+        z: &Envelope<f64>,
+        v: &AxisForces<f64>,
+        deviation_rad_s: f64,
+        at: &Moment<f64>,
+    ) -> Envelope<f64> {
         if self.is_linear() && deviation_rad_s == 0.0 {
             return self.exact.step(z, v);
         }
         // numbers in, numbers out: what the plain step works on then stays in registers
         let [x_c, x_s, y_c, y_s] =
-            self.split_step([z.x_c, z.x_s, z.y_c, z.y_s], [v.x_c, v.x_s, v.y_c, v.y_s], deviation_rad_s);
+            self.split_step([z.x_c, z.x_s, z.y_c, z.y_s], [v.x_c, v.x_s, v.y_c, v.y_s], deviation_rad_s, at);
         Envelope::new(x_c, x_s, y_c, y_s)
     }
 
     /// The step with half steps of what the matrix cannot hold on either side.
     #[inline(never)]
-    fn split_step(&self, z: [f64; 4], [x_c, x_s, y_c, y_s]: [f64; 4], deviation_rad_s: f64) -> [f64; 4] {
+    fn split_step(
+        &self,
+        z: [f64; 4],
+        [x_c, x_s, y_c, y_s]: [f64; 4],
+        deviation_rad_s: f64,
+        at: &Moment<f64>,
+    ) -> [f64; 4] {
         let v = AxisForces { x_c, x_s, y_c, y_s };
         let z = Envelope::new(z[0], z[1], z[2], z[3]);
         let (sin, cos) = Real::sin_cos(-self.angular_gain * deviation_rad_s * self.half_period_s);
-        let before = self.half_nonlinear(z).turned(sin, cos);
+        let before = self.half_nonlinear(z, at).turned(sin, cos);
         let after = self.exact.step(&before, &v).turned(sin, cos);
-        components(&self.half_nonlinear(after))
+        components(&self.half_nonlinear(after, at))
     }
 
     #[inline]
@@ -127,15 +140,15 @@ impl Plant {
         self.nonlinear.is_empty() && self.spring.is_none()
     }
 
-    /// The nonlinear mechanics alone over half a period: one Runge–Kutta step of fourth order.
-    fn half_nonlinear(&self, z: Envelope<f64>) -> Envelope<f64> {
+    /// What the matrix cannot hold of the mechanics alone over half a period: one Runge–Kutta step of fourth order.
+    fn half_nonlinear(&self, z: Envelope<f64>, at: &Moment<f64>) -> Envelope<f64> {
         if self.is_linear() {
             return z;
         }
         let h = self.half_period_s;
         let rate = |e: &Envelope<f64>| {
             let spring = self.spring.map_or(Envelope::zero(), |spring| spring.envelope_rate(e));
-            self.nonlinear.iter().fold(spring, |sum, (id, v)| sum + id.mechanics(v, e))
+            self.nonlinear.iter().fold(spring, |sum, (id, v)| sum + id.mechanics(v, e, at))
         };
         let k1 = rate(&z);
         let k2 = rate(&(z + k1 * (0.5 * h)));

@@ -17,15 +17,15 @@ pub struct Stages {
     pub table: Vec<Setting>,
     /// on the rate that reaches the instrument, after the table's
     pub input: Vec<Setting>,
-    /// mechanics that are linear in the envelope
+    /// mechanics that are linear in the envelope, and the same at every moment
     pub linear: Vec<Setting>,
-    /// mechanics that are not
+    /// mechanics that are not either
     pub nonlinear: Vec<Setting>,
     /// an isotropic nonlinear spring
     pub spring: Option<Spring>,
-    /// on the forces, and in proportion to the commands
+    /// on the forces, in proportion to the commands, and the same at every moment
     pub actuation: Vec<Setting>,
-    /// on the forces before these, and not in proportion
+    /// on the forces before these, and not either
     pub limiting: Vec<Setting>,
     /// on the readout
     pub readout: Vec<Setting>,
@@ -56,15 +56,20 @@ impl Stages {
         // what was written down as text acts before or after what the library has
         let written =
             |first: bool| effects.iter().filter(move |(id, _)| !id.in_library() && id.acts_on_angle() == first);
+        let drives_are_constant =
+            effects.iter().all(|(id, _)| id.description().stage != Stage::Actuation || is_constant(*id));
         let library = EffectId::ALL.iter().flat_map(|id| effects.iter().filter(move |(e, _)| e == id));
         for setting in written(true).chain(library).chain(written(false)) {
             let (id, values) = setting;
             let list = match id.description().stage {
                 Stage::Input if follows_table(*id, values) => &mut stages.table,
                 Stage::Input => &mut stages.input,
-                Stage::Mechanics if is_linear(|e| id.mechanics(values, e)) => &mut stages.linear,
+                Stage::Mechanics if is_constant(*id) && is_linear(|e| id.mechanics(values, e, &Moment::origin())) => {
+                    &mut stages.linear
+                }
                 Stage::Mechanics => &mut stages.nonlinear,
-                Stage::Actuation if id.limits_drives() => &mut stages.limiting,
+                // what comes behind a drive that changes is put behind it
+                Stage::Actuation if id.limits_drives() || !drives_are_constant => &mut stages.limiting,
                 Stage::Actuation => &mut stages.actuation,
                 Stage::Readout => &mut stages.readout,
             };
@@ -88,14 +93,14 @@ impl Stages {
 
     /// What the drives put out of the commands `f`, as far as they can.
     #[inline]
-    pub fn limited(&self, f: AxisForces<f64>) -> AxisForces<f64> {
-        self.limiting.iter().fold(f, |f, (id, v)| id.actuate(v, f))
+    pub fn limited(&self, f: AxisForces<f64>, at: &Moment<f64>) -> AxisForces<f64> {
+        self.limiting.iter().fold(f, |f, (id, v)| id.actuate(v, f, at))
     }
 
     /// The forces that the drives make of what they put out, `f`: linear.
     #[inline]
     pub fn actuate(&self, f: AxisForces<f64>) -> AxisForces<f64> {
-        self.actuation.iter().fold(f, |f, (id, v)| id.actuate(v, f))
+        self.actuation.iter().fold(f, |f, (id, v)| id.actuate(v, f, &Moment::origin()))
     }
 
     /// The readout of the vibration `e`.
@@ -103,6 +108,11 @@ impl Stages {
     pub fn read(&self, e: Envelope<f64>, at: &Moment<f64>) -> Envelope<f64> {
         self.readout.iter().fold(e, |e, (id, v)| id.read(v, e, at))
     }
+}
+
+/// An effect of the mechanics or of the drives that is the same at every moment.
+fn is_constant(id: EffectId) -> bool {
+    !id.by_temperature()
 }
 
 /// The rate depends on the table's angle: the effect is the table's own motion, and its angle reference sees it.

@@ -1,7 +1,7 @@
 //! The exact propagation, against an independent integrator and against the averaged equations.
 
 use approx::assert_abs_diff_eq;
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Moment};
 use cvg_model::resonator::averaged::Averages;
 use cvg_model::resonator::{Anisotropy, Resonator};
 use cvg_model::{AxisForces, Envelope, Orbit};
@@ -55,7 +55,8 @@ impl System<f64, Vector4<f64>> for Equation {
         let stages = Stages::new(&self.effects);
         let free = resonator().envelope_rate(&z, self.rate_rad_s, AHEAD_RAD_S);
         let forced = stages.actuate(self.volts).envelope_rate(1.0 / DRIVE_PER_S_V);
-        let mechanics = self.effects.iter().fold(free + forced, |sum, (id, v)| sum + id.mechanics(v, &z));
+        let mechanics =
+            self.effects.iter().fold(free + forced, |sum, (id, v)| sum + id.mechanics(v, &z, &Moment::origin()));
         *dy = Vector4::new(mechanics.x_c, mechanics.x_s, mechanics.y_c, mechanics.y_s);
     }
 }
@@ -80,7 +81,7 @@ fn against_integrator(effects: &[Setting], deviation_rad_s: f64) -> f64 {
     for k in 0..40 {
         let s = f64::from(k);
         let volts = AxisForces { x_c: 0.3 * s.sin(), x_s: -0.2, y_c: 0.1 * s.cos(), y_s: 0.4 * (2.0 * s).sin() };
-        exact = plant.step(&exact, &volts, deviation_rad_s);
+        exact = plant.step(&exact, &volts, deviation_rad_s, &Moment::origin());
         let equation = Equation { effects: effects.to_vec(), volts, rate_rad_s: RATE_RAD_S + deviation_rad_s };
         reference = integrated(equation, &reference, PERIOD_S);
     }
@@ -137,7 +138,7 @@ fn without_forces_the_envelope_follows_the_averaged_equations() {
         theta: s.theta + h * d.theta,
     };
     for _ in 0..4000 {
-        z = plant.step(&z, &AxisForces::default(), 0.0);
+        z = plant.step(&z, &AxisForces::default(), 0.0, &Moment::origin());
         // Runge–Kutta of fourth order
         let rate = |s: &Averages<f64>| resonator.averaged_rate(s, 0.4);
         let k1 = rate(&averages);
@@ -160,7 +161,7 @@ fn free_decay_and_precession_are_exact() {
     let plant = Plant::new(&resonator(), &Stages::default(), 0.4, 0.0, 1.0, PERIOD_S);
     let mut z = Orbit { a: 1.0, q: 0.0, theta: 0.3, delta: 0.0 }.envelope();
     for _ in 0..20_000 {
-        z = plant.step(&z, &AxisForces::default(), 0.0);
+        z = plant.step(&z, &AxisForces::default(), 0.0, &Moment::origin());
     }
     let expected = Orbit { a: (-10.0_f64 / 22.0).exp(), q: 0.0, theta: 0.3 - 0.78 * 0.4 * 10.0, delta: 0.0 };
     assert!(distance(&z, &expected.envelope()) < 1e-11);
@@ -170,7 +171,8 @@ fn free_decay_and_precession_are_exact() {
 fn every_actuation_effect_that_limits_nothing_is_linear_as_the_propagation_takes_it() {
     for id in EffectId::ALL.iter().filter(|id| !id.limits_drives()) {
         let values = [1.1, 0.05, 0.02, 0.0];
-        let f = |x: f64| id.actuate(&values, AxisForces { x_c: x, x_s: -2.0 * x, y_c: 0.3 * x, y_s: x });
+        let f =
+            |x: f64| id.actuate(&values, AxisForces { x_c: x, x_s: -2.0 * x, y_c: 0.3 * x, y_s: x }, &Moment::origin());
         assert_abs_diff_eq!(f(1.0).y_s * 3.0, f(3.0).y_s, epsilon = 1e-12);
         assert_abs_diff_eq!(f(1.0).x_c * 3.0, f(3.0).x_c, epsilon = 1e-12);
     }
@@ -186,7 +188,7 @@ fn what_limits_the_drives_stands_before_what_is_in_proportion() {
     assert_eq!(of(&stages.limiting), [EffectId::DriveSaturation]);
     assert_eq!(of(&stages.actuation), [EffectId::ActuationGainMismatch]);
     // 3 V of both are clipped at 2 V and then doubled and halved
-    let f = stages.actuate(stages.limited(AxisForces { x_c: 3.0, x_s: 0.0, y_c: 0.0, y_s: 3.0 }));
+    let f = stages.actuate(stages.limited(AxisForces { x_c: 3.0, x_s: 0.0, y_c: 0.0, y_s: 3.0 }, &Moment::origin()));
     let n = 2.0 / core::f64::consts::PI * ((2.0_f64 / 3.0).asin() + 2.0 / 3.0 * (1.0 - 4.0_f64 / 9.0).sqrt());
     assert_abs_diff_eq!(f.x_c, 2.0 * 3.0 * n, epsilon = 1e-12);
     assert_abs_diff_eq!(f.y_s, 0.5 * 3.0 * n, epsilon = 1e-12);
@@ -237,7 +239,7 @@ fn the_spring_is_a_force_with_a_cubic_part_averaged() {
     let (steps, mut averaged) = (200, orbit);
     let plant = Plant::new(&free, &stages, 0.0, 0.0, 1.0, end / f64::from(steps));
     for _ in 0..steps {
-        averaged = plant.step(&averaged, &AxisForces::default(), 0.0);
+        averaged = plant.step(&averaged, &AxisForces::default(), 0.0, &Moment::origin());
     }
     let [forced_p, averaged_p, before] = [forced, averaged, orbit].map(|e| e.pendulum());
     let turned = averaged_p.angle() - before.angle();
@@ -264,7 +266,7 @@ fn a_spring_at_the_carrier_turns_and_speeds_up_as_its_envelope_does() {
     }
     let stages = Stages { spring: Some(spring), ..Stages::default() };
     let plant = Plant::new(&ring, &stages, 0.0, 0.0, 1.0, period_s * f64::from(samples) / 100.0);
-    let averaged = (0..100).fold(orbit, |e, _| plant.step(&e, &AxisForces::default(), 0.0));
+    let averaged = (0..100).fold(orbit, |e, _| plant.step(&e, &AxisForces::default(), 0.0, &Moment::origin()));
     assert!(distance(&orbit, &averaged) > 0.2);
     assert!(distance(&carrier.vibration(), &averaged) < 1e-8, "{}", distance(&carrier.vibration(), &averaged));
 }

@@ -301,6 +301,46 @@ fn skew_temperature_is_half_of_one_plus_a_cosine_of_2_theta_in_proportion_to_it(
     }
 }
 
+/// At one temperature what follows it is the effect at the value that it has there.
+#[test]
+fn what_follows_the_temperature_is_at_each_what_it_follows() {
+    let pairs = [
+        (r#"id = "temperature", gain_per_k = 1e-3"#, r#"id = "detection-gain-mismatch", detection_gain_ratio = 1.02"#),
+        (r#"id = "skew-temperature", skew_per_k = 1e-3"#, r#"id = "detection-skew", skew = 0.02"#),
+        (r#"id = "cubic-temperature", kappa_per_k = 2e-4"#, r#"id = "detection-cubic", kappa = 4e-3"#),
+        (
+            r#"id = "detection-offset-temperature", offset_x_per_k = 1e-4, offset_y_per_k = -2e-4"#,
+            r#"id = "detection-offset", offset_x = 2e-3, offset_y = -4e-3"#,
+        ),
+        (
+            r#"id = "anisodamping-temperature", anisodamping_per_k = 2e-4, theta_slope = 27.0"#,
+            r#"id = "anisodamping", anisodamping = 4e-3, theta_tau = 27.0"#,
+        ),
+        (
+            r#"id = "anisoelasticity-temperature", anisoelasticity_per_k = 1e-2, theta_slope = 55.0"#,
+            r#"id = "anisoelasticity", anisoelasticity = 0.2, theta_omega = 55.0"#,
+        ),
+        (
+            r#"id = "actuation-gain-temperature", actuation_gain_per_k = 1e-3"#,
+            r#"id = "actuation-gain-mismatch", actuation_gain_ratio = 1.02"#,
+        ),
+        (
+            r#"id = "actuation-skew-temperature", actuation_skew_per_k = 1e-3"#,
+            r#"id = "actuation-skew", actuation_skew = 0.02"#,
+        ),
+    ];
+    for (followed, at_its_value) in pairs {
+        let run = |effect| rotation_with("temperature = { start_c = 45.0 }", &format!("{{ {effect} }}"), 200.0, 4.0);
+        let (run, expected) = (run(followed), run(at_its_value));
+        for name in ["xc_v", "ys_v", "vas_v", "vqc_v"] {
+            let off = column(&run, name).iter().zip(column(&expected, name)).map(|(a, b)| (a - b).abs());
+            let off = off.fold(0.0, f64::max);
+            // mechanics that change act in half steps on either side of a step: an error of third order in it
+            assert!(off < 1e-6, "{followed}: {name} is off by {off}");
+        }
+    }
+}
+
 #[test]
 fn scale_temperature_turns_the_pattern_further_in_proportion_to_it() {
     let effect = r#"{ id = "scale-temperature", scale_per_k = 1e-4 }"#;

@@ -284,8 +284,8 @@ fn evaluated(effect: EffectId) {
                 drive: AxisForces { x_c: b, x_s: a, y_c: 0.5, y_s: b },
             },
         );
-        let outputs = [effect.read(&p, e, &at), effect.unread(&p, e, &at), effect.mechanics(&p, &e)];
-        let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b });
+        let outputs = [effect.read(&p, e, &at), effect.unread(&p, e, &at), effect.mechanics(&p, &e, &at)];
+        let forces = effect.actuate(&p, AxisForces { x_c: a, x_s: b, y_c: a, y_s: b }, &at);
         let rate = effect.input_rate(&p, a, &at);
         std::hint::black_box((outputs, forces, rate));
     }

@@ -6,7 +6,7 @@
 //! It refuses to look at the angle. A fit of that takes the level from here, with its uncertainty.
 
 use cvg_estimator::direction::{Direction, major_axis};
-use cvg_model::effects::{EffectId, Stage, Values};
+use cvg_model::effects::{EffectId, Moment, Stage, Values};
 use cvg_model::{AxisForces, Envelope};
 use nalgebra::{DMatrix, DVector, Matrix5, Vector5};
 
@@ -43,9 +43,10 @@ const LIKELY: f64 = 6.6;
 /// Fewest pairs with a command beyond the level.
 const FEWEST_BEYOND: usize = 20;
 
-/// What a drive was commanded to and where the pattern lay, at one sample.
+/// What the drives were commanded to and where the pattern lay, at one sample.
 struct Instant {
-    volts: AxisForces<f64>,
+    /// with what the drives were commanded to
+    at: Moment<f64>,
     axis: Direction<f64>,
     per_amplitude: f64,
 }
@@ -94,8 +95,8 @@ fn pairs(track: &Track, hypothesis: &Hypothesis, out: &mut Vec<Pair>, stride: us
         let around: [Instant; 4] = std::array::from_fn(|j| {
             let z = seen[j].0;
             let p = z.pendulum();
-            let volts = track.moment(i + j - 1, 0.0).drive;
-            Instant { volts, axis: major_axis(&z, &p), per_amplitude: 1.0 / p.e.sqrt() }
+            let at = track.moment(i + j - 1, 0.0);
+            Instant { at, axis: major_axis(&z, &p), per_amplitude: 1.0 / p.e.sqrt() }
         });
         out.push(Pair {
             widening: (after - before) / dt,
@@ -103,7 +104,7 @@ fn pairs(track: &Track, hypothesis: &Hypothesis, out: &mut Vec<Pair>, stride: us
             cos2: mean(&around, |at| at.axis.cos * at.axis.cos - at.axis.sin * at.axis.sin),
             sin2: mean(&around, |at| 2.0 * at.axis.sin * at.axis.cos),
             per_amplitude: mean(&around, |at| at.per_amplitude),
-            largest: around.iter().map(|at| size(&at.volts)).fold(0.0, f64::max),
+            largest: around.iter().map(|at| size(&at.at.drive)).fold(0.0, f64::max),
             around,
         });
     }
@@ -138,8 +139,8 @@ impl Balance {
     /// What a pair was pushed by, per unit of force scale and amplitude, where drives clip at 1/`inverse_level`.
     fn pushed(&self, pair: &Pair, inverse_level: f64) -> f64 {
         mean(&pair.around, |at| {
-            let clipped = EffectId::DriveSaturation.actuate(&[inverse_level, 0.0, 0.0, 0.0], at.volts);
-            let f = self.actuation.iter().fold(clipped, |f, (id, values)| id.actuate(values, f));
+            let clipped = EffectId::DriveSaturation.actuate(&[inverse_level, 0.0, 0.0, 0.0], at.at.drive, &at.at);
+            let f = self.actuation.iter().fold(clipped, |f, (id, values)| id.actuate(values, f, &at.at));
             (at.axis.cos * f.y_c - at.axis.sin * f.x_c) * at.per_amplitude
         })
     }
@@ -170,7 +171,7 @@ impl Balance {
     }
 
     fn largest_command(&self) -> f64 {
-        let mut all: Vec<f64> = self.pairs.iter().map(|p| size(&p.around[1].volts)).collect();
+        let mut all: Vec<f64> = self.pairs.iter().map(|p| size(&p.around[1].at.drive)).collect();
         all.sort_by(f64::total_cmp);
         // a few may be spikes
         all.get(all.len().saturating_sub(1 + FEWEST_BEYOND / 2)).copied().unwrap_or_default()
@@ -254,7 +255,7 @@ pub(crate) fn clipping(dataset: &Dataset, hypothesis: &Hypothesis) -> Option<Cli
     let by_chance = n * (before / after).ln();
     let tried = 2.0 * ((TRIED + REFINED) as f64).ln();
     let gain = by_chance - n.ln() - tried;
-    let count = balance.pairs.iter().filter(|p| size(&p.around[1].volts) * x > 1.0).count();
+    let count = balance.pairs.iter().filter(|p| size(&p.around[1].at.drive) * x > 1.0).count();
     if by_chance - tried < LIKELY {
         return None;
     }

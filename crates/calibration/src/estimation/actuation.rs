@@ -3,9 +3,10 @@
 //! With the pattern held at an angle the energy loop is on, then off. Off, the amplitude decays at the damping of that
 //! direction; on, the command replaces just that loss. The two together give the drive's gain in that direction.
 
-use cvg_model::ControlOutputs;
+use cvg_estimator::direction::major_axis;
 pub use cvg_model::actuation::actuation_gain_ratio;
-use cvg_model::effects::Moment;
+use cvg_model::effects::{Moment, Stage};
+use cvg_model::{AxisForces, ControlOutputs, Envelope};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::data::track::commanded;
@@ -34,6 +35,8 @@ pub struct RingDown {
     pub drive: f64,
     /// its standard error
     pub drive_error: f64,
+    /// mean temperature over the one that parameters refer to, K; 0 where it was not recorded
+    pub warmer_k: f64,
     /// amplitude over time, for the report
     pub decay: Vec<(f64, f64)>,
 }
@@ -94,6 +97,8 @@ struct Phases {
     /// of the pattern from the campaign's angle, rad, and as it was read
     off_angle: Vec<f64>,
     read: Vec<f64>,
+    /// sum of the temperatures over the one that parameters refer to, K
+    warmth: f64,
     decay: Vec<(f64, f64)>,
 }
 
@@ -120,16 +125,18 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
         off: Phase::default(),
         off_angle: Vec::new(),
         read: Vec::new(),
+        warmth: 0.0,
         decay: Vec::new(),
     };
     let (mut before, mut work) = (None, 0.0);
     for i in settled.clone() {
         let (xs, ys) = quadrature.map_or((0.0, 0.0), |(a, b)| (a[i], b[i]));
-        let seen = cvg_model::Envelope::new(x[i], xs, y[i], ys);
+        let seen = Envelope::new(x[i], xs, y[i], ys);
         let commands = ControlOutputs { v_as: command(Some(v_as), i), v_qc: command(r.vqc_v.as_ref(), i) };
         let drive = commanded(&seen, &commands);
         let now = Moment { t_s: r.t_s[i], warmer_k: warmer_k(i), drive, ..Moment::default() };
         let p = hypothesis.unread(seen, &now).pendulum();
+        found.warmth += now.warmer_k;
         found.off_angle.push(wrapped(p.angle() - angle_rad, std::f64::consts::PI));
         found.read.push(wrapped(seen.pendulum().angle() - angle_rad, std::f64::consts::PI));
         let ln_a = 0.5 * p.e.ln();
@@ -140,7 +147,7 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
             found.decay.push((r.t_s[i], ln_a.exp()));
         }
         if r.t_s[i] >= steady && r.t_s[i] < energy_off_s && v_as[i].is_finite() {
-            found.on.push(r.t_s[i], ln_a, v_as[i] / ln_a.exp());
+            found.on.push(r.t_s[i], ln_a, followed(hypothesis, &seen, &now) * v_as[i] / ln_a.exp());
         } else if r.t_s[i] > energy_off_s {
             let step = before.map_or(0.0, |before| r.t_s[i] - before);
             work += step * 0.5 * commands.v_qc * p.q / p.e.powf(1.5);
@@ -149,6 +156,16 @@ fn phases(run: &Run, hypothesis: &Hypothesis, angle_rad: f64, energy_off_s: f64)
         before = Some(r.t_s[i]);
     }
     Ok(found)
+}
+
+/// What a command along the pattern makes through drives that follow the temperature, as a share of what it makes at the one that parameters
+/// refer to.
+fn followed(hypothesis: &Hypothesis, seen: &Envelope<f64>, at: &Moment<f64>) -> f64 {
+    let axis = major_axis(seen, &seen.pendulum());
+    let along = AxisForces { x_c: 0.0, x_s: axis.cos, y_c: 0.0, y_s: axis.sin };
+    let followed = hypothesis.acting(Stage::Actuation).filter(|(_, m)| m.id.by_temperature());
+    let forces = followed.fold(along, |f, (_, m)| m.id.actuate(&m.values, f, at));
+    forces.x_s * axis.cos + forces.y_s * axis.sin
 }
 
 /// The damping that a decay shows: ȧ/a = −1/τ + G v_qc q/a², for what holds a split works on the ellipse that the
@@ -177,7 +194,9 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
     };
     let refuse = |problem: String, wanted: &str| Err(Refusal::new(&name, problem, wanted));
     let angle_rad = angle_deg.to_radians();
-    let Phases { mut on, mut off, off_angle, mut read, decay } = phases(run, hypothesis, angle_rad, energy_off_s)?;
+    let Phases { mut on, mut off, off_angle, mut read, warmth, decay } =
+        phases(run, hypothesis, angle_rad, energy_off_s)?;
+    let warmer_k = warmth / off_angle.len().max(1) as f64;
     let middle = crate::numerics::statistics::median(&mut off_angle.clone());
     let spread = robust_deviation(off_angle.iter().map(|a| a - middle));
     if middle.abs() > LARGEST_ANGLE_ERROR_RAD || spread > LARGEST_ANGLE_ERROR_RAD {
@@ -235,6 +254,7 @@ pub fn ring_down(run: &Run, hypothesis: &Hypothesis) -> Result<RingDown, Refusal
         uneven: decayed.uneven,
         drive: hold(rate),
         drive_error: (STUDENT_11 * mean_error(&on.command, mean)).hypot(hold(rate) * trend_error / (rate + trend)),
+        warmer_k,
         decay,
     })
 }

@@ -29,6 +29,8 @@ impl Dataset {
         if hypothesis.force_scale == 0.0 || !self.tracks.iter().all(|p| p.track.records_the_loops()) {
             return;
         }
+        let slope =
+            hypothesis.member(EffectId::AnisoelasticityTemperature).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
         let none = Unknowns::new(hypothesis, Vec::new());
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for p in &self.tracks {
@@ -45,7 +47,9 @@ impl Dataset {
                     let Some(v) = p.track.commands(row.index, 1).filter(|_| line > 0.0) else { return };
                     let (sin, cos) = (pendulum.s / line, pendulum.r / line);
                     let command = hypothesis.force_scale * v.now.v_qc / pendulum.e.sqrt();
-                    let rates = [command, -0.5 * sin, 0.5 * cos];
+                    let warmer_k = p.track.warmer_k(row.index);
+                    let followed = 0.5 * warmer_k * (slope[1] * cos - slope[0] * sin);
+                    let rates = [command + followed, -0.5 * sin, 0.5 * cos];
                     let t = p.track.t_s[row.index];
                     if let Some((t0, before)) = last {
                         for ((sum, a), b) in sums.iter_mut().zip(before).zip(rates) {

@@ -180,7 +180,9 @@ fn through_skew(hypothesis: &Hypothesis) -> f64 {
 
 /// What the anisodamping adds to the damping that a ring-down shows, 1/s.
 fn anisodamping(r: &RingDown, hypothesis: &Hypothesis) -> f64 {
-    let [cos, sin] = hypothesis.member(EffectId::Anisodamping).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
+    let of = |id| hypothesis.member(id).map_or([0.0; 2], |m| [m.values[0], m.values[1]]);
+    let (mean, slope) = (of(EffectId::Anisodamping), of(EffectId::AnisodampingTemperature));
+    let [cos, sin] = [0, 1].map(|p| mean[p] + slope[p] * r.warmer_k);
     0.5 * (cos * (2.0 * r.angle_rad).cos() + sin * (2.0 * r.angle_rad).sin())
 }
 
@@ -283,6 +285,7 @@ mod tests {
                 uneven: 0.0,
                 drive: -0.045,
                 drive_error: 1e-5,
+                warmer_k: 0.0,
                 decay: Vec::new(),
             }
         };

@@ -201,7 +201,7 @@ mod tests {
     fn a_spring_that_goes_with_four_times_the_angle_precesses_as_the_librarys() {
         let (e, p) = (Envelope::new(0.8, 0.1, -0.3, 0.2), [0.03, -0.02, 0.0, 0.0]);
         let m = Mechanics { spring: 0.0, spring_four: [p[0], p[1]], ..M };
-        let rate = e.pendulum_rate(&EffectId::SpringCubic.mechanics(&p, &e));
+        let rate = e.pendulum_rate(&EffectId::SpringCubic.mechanics(&p, &e, &Moment::origin()));
         let u = of(&e);
         let theta_dot = (u[1] * rate.s - u[2] * rate.r) / (2.0 * (u[1] * u[1] + u[2] * u[2]));
         assert!((m.precession_of_springs(&u) - theta_dot).abs() < 1e-12);

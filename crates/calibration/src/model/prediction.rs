@@ -159,10 +159,10 @@ impl<'h> Predictor<'h> {
             unknowns.forcing.iter().zip(&self.actuation_of_jets).filter(|(lanes, _)| !lanes.columns.is_empty());
         let commands = commands.filter(|_| hypothesis.force_scale != 0.0 || drives.clone().next().is_some());
         let driven = commands.map(|v| (v, major_axis(&seen, &seen.pendulum())));
-        let forced = driven.as_ref().map(|(v, axis)| self.actuation.rate(v, axis, |x| x));
+        let forced = driven.as_ref().map(|(v, axis)| self.actuation.rate(v, axis, at, |x| x));
         let mechanical = hypothesis.instrument == Instrument::Gyroscope;
         let z = self.undo_readout(seen, at, out);
-        self.add_readout(&z, forced.as_ref(), out);
+        self.add_readout(&z, forced.as_ref(), at, out);
         out.theta = hypothesis.bearing(&z);
         out.envelope = z;
         out.ln_amplitude = 0.5 * z.pendulum().e.ln();
@@ -171,7 +171,7 @@ impl<'h> Predictor<'h> {
             return;
         }
         let gradient = Gradient::of(&z);
-        self.add_mechanics(&z, &gradient, out);
+        self.add_mechanics(&z, &gradient, at, out);
         if !recorded {
             self.steer(&seen, &gradient, at, out);
         }
@@ -182,7 +182,7 @@ impl<'h> Predictor<'h> {
         }
         if let Some((v, axis)) = driven {
             for (lanes, drive) in drives {
-                let rate = drive.rate(&v, &axis, Jet::constant);
+                let rate = drive.rate(&v, &axis, at, Jet::constant);
                 for (lane, &i) in lanes.columns.iter().enumerate() {
                     let (turn, grow) = gradient.along(&part(&rate, |j| j.slope[lane]));
                     out.slopes[i][THETA_RATE] += turn;
@@ -208,7 +208,7 @@ impl<'h> Predictor<'h> {
 
     /// Slopes against the readout's parameters by the chain rule: how bearing, ln of the amplitude and the rate of the pattern
     /// change with the vibration `z`, then with what stood before each link, from the last one undone to the first.
-    fn add_readout(&self, z: &Envelope<f64>, forced: Option<&Envelope<f64>>, out: &mut Vibration) {
+    fn add_readout(&self, z: &Envelope<f64>, forced: Option<&Envelope<f64>>, at: &Moment<f64>, out: &mut Vibration) {
         use quantity::{LN_AMPLITUDE, THETA, THETA_RATE};
         if self.readout.is_empty() {
             return;
@@ -219,7 +219,7 @@ impl<'h> Predictor<'h> {
         let Envelope { x_c, x_s, y_c, y_s } = *z * (1.0 / z.pendulum().e);
         gradients[LN_AMPLITUDE] = [x_c, x_s, y_c, y_s];
         if self.hypothesis.instrument == Instrument::Gyroscope {
-            gradients[THETA_RATE] = jets.precession(&self.rate_of(&jets, forced)).slope;
+            gradients[THETA_RATE] = jets.precession(&self.rate_of(&jets, forced, at)).slope;
         }
         for (link, undone) in self.readout.iter().zip(&out.undone).rev() {
             // d(quantity) against every lane of this link
@@ -245,15 +245,15 @@ impl<'h> Predictor<'h> {
     }
 
     /// What damping and mechanics do to the vibration, and a unit of each of their unknowns.
-    fn add_mechanics(&self, z: &Envelope<f64>, gradient: &Gradient, out: &mut Vibration) {
+    fn add_mechanics(&self, z: &Envelope<f64>, gradient: &Gradient, at: &Moment<f64>, out: &mut Vibration) {
         use quantity::{GROWTH, THETA_RATE};
         for (id, values) in &self.mechanics {
-            let (turn, grow) = gradient.along(&id.mechanics(values, z));
+            let (turn, grow) = gradient.along(&id.mechanics(values, z, at));
             out.theta_rate += turn;
             out.growth += grow;
         }
         for (i, id, unit) in &self.units {
-            let (turn, grow) = gradient.along(&id.mechanics(unit, z));
+            let (turn, grow) = gradient.along(&id.mechanics(unit, z, at));
             out.slopes[*i][THETA_RATE] = turn;
             out.slopes[*i][GROWTH] = grow;
         }
@@ -273,7 +273,7 @@ impl<'h> Predictor<'h> {
         let axis = major_axis(seen, &seen.pendulum());
         let unit = |drive: &Drive<Jet>, now| {
             let held = Commands { now, change_per_s: still, across: 0.0, turn_rad_s: at.precession_rad_s };
-            drive.rate(&held, &axis, Jet::constant)
+            drive.rate(&held, &axis, at, Jet::constant)
         };
         let energies = self.loops.iter().map(|drive| unit(drive, ControlOutputs { v_as: 1.0, ..still }));
         let Some((first, energy)) = self.loops.first().zip(energies.clone().next()) else { return };
@@ -295,20 +295,25 @@ impl<'h> Predictor<'h> {
             }
         }
         let widened: f64 =
-            self.mechanics.iter().map(|(id, v)| gradient.widening(&id.mechanics(v, &out.envelope))).sum();
+            self.mechanics.iter().map(|(id, v)| gradient.widening(&id.mechanics(v, &out.envelope, at))).sum();
         out.theta_rate -= by_growth * out.growth + by_quadrature * widened;
         for slope in &mut out.slopes {
             slope[THETA_RATE] -= slope[STEERING] * out.growth + by_growth * slope[GROWTH];
         }
         for (i, id, unit) in &self.units {
-            out.slopes[*i][THETA_RATE] -= by_quadrature * gradient.widening(&id.mechanics(unit, &out.envelope));
+            out.slopes[*i][THETA_RATE] -= by_quadrature * gradient.widening(&id.mechanics(unit, &out.envelope, at));
         }
     }
 
     /// How the mechanics and forces that do not depend on the readout move a vibration, per second.
-    fn rate_of(&self, z: &Envelope<Jet<COMPONENTS>>, forced: Option<&Envelope<f64>>) -> Envelope<Jet<COMPONENTS>> {
-        let start = forced.map_or_else(Envelope::zero, lifted);
-        self.mechanics_of_jets.iter().fold(start, |sum, (id, values)| sum + id.mechanics(values, z))
+    fn rate_of(
+        &self,
+        z: &Envelope<Jet<COMPONENTS>>,
+        forced: Option<&Envelope<f64>>,
+        at: &Moment<f64>,
+    ) -> Envelope<Jet<COMPONENTS>> {
+        let (start, at) = (forced.map_or_else(Envelope::zero, lifted), at.map(Jet::constant));
+        self.mechanics_of_jets.iter().fold(start, |sum, (id, values)| sum + id.mechanics(values, z, &at))
     }
 
     /// By how much the rotation that reaches the resonator exceeds the nominal one, rad/s, with slopes against group `lanes` of
@@ -323,7 +328,13 @@ impl<T: Real> Drive<T> {
     /// What the commands make of the envelope, per second: Equation 9 with the commands and the orientation of
     /// `control_latency_s` ago (outputs are held for a control period), through the actuation effects, which are of volts.
     #[inline]
-    fn rate(&self, commands: &Commands, seen: &Direction<f64>, lift: impl Fn(f64) -> T) -> Envelope<T> {
+    fn rate(
+        &self,
+        commands: &Commands,
+        seen: &Direction<f64>,
+        at: &Moment<f64>,
+        lift: impl Fn(f64) -> T,
+    ) -> Envelope<T> {
         let latency = self.control_latency_s;
         let (sin_late, cos_late) = (latency * lift(commands.turn_rad_s)).sin_cos();
         let (cos, sin) = (lift(seen.cos), lift(seen.sin));
@@ -335,7 +346,8 @@ impl<T: Real> Drive<T> {
         let along = equal.axis_forces_along(&v, cos, sin);
         let across = lift(commands.across);
         let volts = AxisForces { x_s: along.x_s - across * sin, y_s: along.y_s + across * cos, ..along };
-        let forces = self.effects.iter().fold(volts, |f, (id, values)| id.actuate(values, f));
+        let at = at.map(&lift);
+        let forces = self.effects.iter().fold(volts, |f, (id, values)| id.actuate(values, f, &at));
         forces.envelope_rate(T::one()) * self.force_scale
     }
 }

@@ -191,7 +191,7 @@ fn same_unit(calibration: &Calibration, recording: &Recording) -> Result<(), Ref
 
 /// A recording without a temperature can be compensated where nothing follows it.
 fn needs_no_temperature(h: &Hypothesis, recording: &Recording) -> Result<(), Refusal> {
-    let member = h.acting(Stage::Readout).find(|(_, m)| m.id.by_temperature()).map(|(_, m)| m.id.to_string());
+    let member = h.members.iter().find(|m| m.id.by_temperature()).map(|m| m.id.to_string());
     let follows = member.or((h.rate_bias_per_k_rad_s != 0.0).then(|| "the bias".into()));
     let Some(what) = follows.filter(|_| !recording.temp_c.iter().flatten().any(|t| t.is_finite())) else {
         return Ok(());

@@ -43,8 +43,11 @@ fn is_of_a_higher_power(id: EffectId) -> bool {
 /// The effects of the library that are this one where all runs are at one amplitude.
 pub(crate) fn alike_at_one_amplitude(id: EffectId) -> impl Iterator<Item = EffectId> {
     let own = id.description();
-    let is_lowest =
-        own.scaling.amplitude == LOWEST_POWER && own.stage == Stage::Readout && own.onsets.is_empty() && !own.empirical;
+    let is_lowest = own.scaling.amplitude == LOWEST_POWER
+        && own.stage == Stage::Readout
+        && own.onsets.is_empty()
+        && !own.empirical
+        && !id.by_temperature();
     let all = EffectId::ALL.iter().copied().filter(move |_| is_lowest);
     all.filter(move |other| is_of_a_higher_power(*other) && other.description().stage == own.stage)
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use cvg_model::Envelope;
-use cvg_model::effects::EffectId;
+use cvg_model::effects::{EffectId, Moment};
 use cvg_model::resonator::envelope::{detuning, precession};
 use cvg_model::resonator::{Anisotropy, Resonator};
 
@@ -93,7 +93,7 @@ impl Ring {
         let share = if self.speeds_up { t / self.end_s() } else { 1.0 };
         let [cos, sin] = self.spring_four;
         self.resonator.envelope_rate(e, share * self.rate_dps.to_radians(), self.ahead_rad_s)
-            + EffectId::SpringCubic.mechanics(&[cos, sin, 0.0, 0.0], e)
+            + EffectId::SpringCubic.mechanics(&[cos, sin, 0.0, 0.0], e, &Moment::origin())
             + precession(self.spring * p.q, e)
             + detuning(self.frequency_per_energy * p.e, e)
     }

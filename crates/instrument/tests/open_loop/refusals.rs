@@ -28,7 +28,14 @@ fn an_effect_of_a_recordings_clock_or_thermometer_is_refused_and_every_other_of_
     refused.sort_by_key(|id| id.description().id);
     assert_eq!(
         refused,
-        [EffectId::GainDrift, EffectId::SkewTemperature, EffectId::Temperature, EffectId::TimePeriodic]
+        [
+            EffectId::CubicTemperature,
+            EffectId::DetectionOffsetTemperature,
+            EffectId::GainDrift,
+            EffectId::SkewTemperature,
+            EffectId::Temperature,
+            EffectId::TimePeriodic
+        ]
     );
 }
 

@@ -3,7 +3,7 @@
 //! A lag that both channels of the readout have in common is the same thing: the phase-locked loop follows it, and the forces
 //! are off by it. In phase with the vibration, a share φ of what holds the split pushes the pattern along: θ̇ ∋ ½Δω φ sin 2(θ − θ_ω).
 
-use super::{Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{AxisForces, Real};
 
 /// phase of the drives against the readout.
@@ -26,7 +26,7 @@ impl Effect for ActuationPhase {
     };
 
     #[inline]
-    fn actuate<T: Real>(&[phase, ..]: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    fn actuate<T: Real>(&[phase, ..]: &Values<T>, f: AxisForces<T>, _: &Moment<T>) -> AxisForces<T> {
         let (sin, cos) = phase.sin_cos();
         f.ahead(cos, sin)
     }

@@ -1,6 +1,7 @@
 //! A drive that couples X into Y: f_y += s_a·f_x.
 
-use super::{Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::over_temperature::Followed;
+use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{AxisForces, Real};
 
 /// skewed or cross-coupled drive axes.
@@ -23,7 +24,18 @@ impl Effect for ActuationSkew {
     };
 
     #[inline]
-    fn actuate<T: Real>(&[s, ..]: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    fn actuate<T: Real>(&[s, ..]: &Values<T>, f: AxisForces<T>, _: &Moment<T>) -> AxisForces<T> {
         AxisForces { y_c: f.y_c + s * f.x_c, y_s: f.y_s + s * f.x_s, ..f }
     }
+}
+
+impl Followed for ActuationSkew {
+    const SLOPES: Description = Description {
+        id: "actuation-skew-temperature",
+        title: "actuation skew that follows the temperature",
+        parameters: &[fitted("actuation_skew_per_k", "1/K", 0.1, 1e-3)],
+        signature: "v_as at 2θ (sine), ∝ s(T − T₀); a precession ∝ 1/(τΩ)",
+        source: "temperature coefficients of the drive electronics",
+        ..Self::DESCRIPTION
+    };
 }

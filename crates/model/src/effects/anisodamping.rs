@@ -1,6 +1,7 @@
 //! Damping that differs between two principal axes: Δ(1/τ) at θ_τ, resolved into (Δ cos 2θ_τ, Δ sin 2θ_τ).
 
-use super::{Belief, Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::over_temperature::Followed;
+use super::{Belief, Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
 /// Four times the difference that the paper's device has, 1/s.
@@ -36,9 +37,32 @@ impl Effect for Anisodamping {
     };
 
     #[inline]
-    fn mechanics<T: Real>(&[cos2, sin2, ..]: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+    fn mechanics<T: Real>(&[cos2, sin2, ..]: &Values<T>, e: &Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         envelope_rate(cos2, sin2, e)
     }
+}
+
+impl Followed for Anisodamping {
+    const SLOPES: Description = Description {
+        id: "anisodamping-temperature",
+        title: "anisodamping that follows the temperature",
+        declared: false,
+        parameters: &[
+            fitted("anisodamping_cos2_per_k", "1/s/K", 1.0, 1e-4),
+            fitted("anisodamping_sin2_per_k", "1/s/K", 1.0, 1e-4),
+        ],
+        shown: &[Shown::Polar {
+            cos: 0,
+            sin: 1,
+            magnitude: "anisodamping_per_k",
+            unit: "1/s/K",
+            angle: "theta_slope",
+            division: 2.0,
+        }],
+        signature: "angle s(T − T₀)/(4kΩ) cos 2(θ−θ_s); v_as at 2θ, ½s(T − T₀)τ relative",
+        source: "thermoelastic damping and anchor losses over the temperature",
+        ..Self::DESCRIPTION
+    };
 }
 
 /// Ẋ ∋ −½(X Δcos2θ_τ + Y Δsin2θ_τ), Ẏ ∋ −½(X Δsin2θ_τ − Y Δcos2θ_τ); `cos2`, `sin2` in 1/s.

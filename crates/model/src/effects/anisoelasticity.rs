@@ -1,6 +1,7 @@
 //! Stiffness that differs between two principal axes: Δω at θ_ω, resolved into (Δω cos 2θ_ω, Δω sin 2θ_ω).
 
-use super::{Belief, Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::over_temperature::Followed;
+use super::{Belief, Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
 /// A split of 1 Hz, in rad/s.
@@ -36,9 +37,34 @@ impl Effect for Anisoelasticity {
     };
 
     #[inline]
-    fn mechanics<T: Real>(&[cos2, sin2, ..]: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+    fn mechanics<T: Real>(&[cos2, sin2, ..]: &Values<T>, e: &Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         envelope_rate(cos2, sin2, e)
     }
+}
+
+impl Followed for Anisoelasticity {
+    const SLOPES: Description = Description {
+        id: "anisoelasticity-temperature",
+        title: "anisoelasticity that follows the temperature",
+        declared: false,
+        parameters: &[
+            fitted("anisoelasticity_cos2_per_k", "rad/s/K", 1e2, 1e-3),
+            fitted("anisoelasticity_sin2_per_k", "rad/s/K", 1e2, 1e-3),
+        ],
+        shown: &[Shown::Polar {
+            cos: 0,
+            sin: 1,
+            magnitude: "anisoelasticity_per_k",
+            unit: "rad/s/K",
+            angle: "theta_slope",
+            division: 2.0,
+        }],
+        signature: "v_qc at 2θ, (T − T₀) sin 2(θ−θ_s); in the angle only through the quadrature that is left",
+        source: "temperature coefficients of stiffness that differ between the axes",
+        ..Self::DESCRIPTION
+    };
+
+    const SLOPES_SEEN_BY_LOOPS: bool = true;
 }
 
 /// Ẋ ∋ −(i/2)(X Δωcos2θ_ω + Y Δωsin2θ_ω), Ẏ ∋ −(i/2)(X Δωsin2θ_ω − Y Δωcos2θ_ω); `cos2`, `sin2` in rad/s.

@@ -2,6 +2,7 @@
 //!
 //! The two axes' coefficients are κ ± δκ: κ_x = κ + δκ, κ_y = κ − δκ.
 
+use super::over_temperature::Followed;
 use super::{Description, Effect, Inverse, Moment, Scaling, Shown, Stage, Values, fitted, refined};
 use crate::{Envelope, Real};
 
@@ -39,6 +40,19 @@ impl Effect for DetectionCubic {
     fn inverse<T: Real>(p: &Values<T>) -> Inverse<T> {
         Inverse::Cubic(Cubic::new(p))
     }
+}
+
+impl Followed for DetectionCubic {
+    const SLOPES: Description = Description {
+        id: "cubic-temperature",
+        title: "cubic readout that follows the temperature",
+        in_sensors: false,
+        parameters: &[fitted("kappa_per_k", "1/V^2/K", 1e5, 1e-4)],
+        shown: &[Shown::Plain(0)],
+        signature: "angle −(3/16)s(T − T₀)a² sin 4θ",
+        source: "thermal expansion of the gap of the plates",
+        ..Self::DESCRIPTION
+    };
 }
 
 /// (c, s)·(1 + ¾κ(c² + s²)): the first harmonic of x + κx³.

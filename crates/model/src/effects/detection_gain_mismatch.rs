@@ -1,6 +1,7 @@
 //! Unequal readout gains: y_d = g·y with g = G_Dy/G_Dx (Equations 5 to 7).
 
-use super::{Belief, Description, Effect, Inverse, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::over_temperature::Followed;
+use super::{Belief, Description, Effect, Inverse, Moment, Parameter, Role, Scaling, Shown, Stage, Values, fitted};
 use crate::{DetectionGains, Envelope, Real};
 
 /// unequal detection gains.
@@ -44,4 +45,19 @@ impl Effect for DetectionGainMismatch {
     fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
         Inverse::Affine
     }
+}
+
+impl Followed for DetectionGainMismatch {
+    const SLOPES: Description = Description {
+        id: "temperature",
+        title: "detection gain ratio that follows the temperature",
+        declared: false,
+        in_sensors: false,
+        parameters: &[fitted("gain_per_k", "1/K", 0.1, 1e-4)],
+        signature: "angle ½s(T − T₀) sin 2θ",
+        source: "temperature coefficients of the readout electronics",
+        ..Self::DESCRIPTION
+    };
+
+    const IS_RATIO: bool = true;
 }

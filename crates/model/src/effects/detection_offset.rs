@@ -1,5 +1,6 @@
 //! Constant in-phase offsets of the demodulated readout, V: x_d = x + o_x, y_d = y + o_y.
 
+use super::over_temperature::Followed;
 use super::{Description, Effect, Inverse, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
@@ -35,4 +36,16 @@ impl Effect for DetectionOffset {
     fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
         Inverse::Affine
     }
+}
+
+impl Followed for DetectionOffset {
+    const SLOPES: Description = Description {
+        id: "detection-offset-temperature",
+        title: "offsets of the readout that follow the temperature",
+        in_sensors: false,
+        parameters: &[fitted("offset_x_per_k", "V/K", 1e2, 1e-4), fitted("offset_y_per_k", "V/K", 1e2, 1e-4)],
+        signature: "angle (T − T₀)(s_y cos θ − s_x sin θ)/a: harmonic 1, ∝ 1/a",
+        source: "temperature coefficients of the readout electronics",
+        ..Self::DESCRIPTION
+    };
 }

@@ -1,5 +1,6 @@
 //! A readout whose axes are not orthogonal, or that couples X into Y: y_d = y + s·x.
 
+use super::over_temperature::Followed;
 use super::{Description, Effect, Inverse, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real};
 
@@ -35,4 +36,16 @@ impl Effect for DetectionSkew {
     fn inverse<T: Real>(_: &Values<T>) -> Inverse<T> {
         Inverse::Affine
     }
+}
+
+impl Followed for DetectionSkew {
+    const SLOPES: Description = Description {
+        id: "skew-temperature",
+        title: "detection skew that follows the temperature",
+        in_sensors: false,
+        parameters: &[fitted("skew_per_k", "1/K", 0.1, 1e-4)],
+        signature: "angle ½s(T − T₀)(1 + cos 2θ)",
+        source: "temperature coefficients of the readout electronics",
+        ..Self::DESCRIPTION
+    };
 }

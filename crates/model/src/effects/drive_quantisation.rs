@@ -6,7 +6,7 @@
 //! step; a command that its loop holds at the edge of a step goes to and fro between two of them. What pushes along the pattern by that
 //! is taken up by the energy loop, what pushes across it turns the pattern.
 
-use super::{Belief, Description, Effect, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Belief, Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{AxisForces, Real};
 
 /// coarse steps of the drives.
@@ -39,7 +39,7 @@ impl Effect for DriveQuantisation {
     };
 
     #[inline]
-    fn actuate<T: Real>(&[step, ..]: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    fn actuate<T: Real>(&[step, ..]: &Values<T>, f: AxisForces<T>, _: &Moment<T>) -> AxisForces<T> {
         if step > T::zero() {
             let [x_c, x_s, y_c, y_s] = [f.x_c, f.x_s, f.y_c, f.y_s].map(|force| rounded(force, step));
             AxisForces { x_c, x_s, y_c, y_s }

@@ -8,7 +8,7 @@
 //! beside a large v_qc, pushes the pattern along, but hardly.
 
 use super::detection_saturation::clipped_gain;
-use super::{Belief, Description, Effect, Parameter, Role, Scaling, Shown, Stage, Values};
+use super::{Belief, Description, Effect, Moment, Parameter, Role, Scaling, Shown, Stage, Values};
 use crate::{AxisForces, Real};
 
 /// clipping of the drives.
@@ -41,7 +41,7 @@ impl Effect for DriveSaturation {
     };
 
     #[inline]
-    fn actuate<T: Real>(&[inverse_level, ..]: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    fn actuate<T: Real>(&[inverse_level, ..]: &Values<T>, f: AxisForces<T>, _: &Moment<T>) -> AxisForces<T> {
         let x = clipped_gain(inverse_level * f.x_c.norm(f.x_s));
         let y = clipped_gain(inverse_level * f.y_c.norm(f.y_s));
         AxisForces { x_c: x * f.x_c, x_s: x * f.x_s, y_c: y * f.y_c, y_s: y * f.y_s }

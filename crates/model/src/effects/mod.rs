@@ -4,6 +4,8 @@
 //! units and bounds, its signature and its source. The simulator applies the definition, the identification predicts
 //! from it, the compensation inverts it, and the documentation prints it.
 //!
+//! Where a parameter may follow the temperature, the effect says so in the same file, and [`over_temperature`] makes an effect of that.
+//!
 //! **To add an effect**: write `effects/my_effect.rs` with a type that implements [`Effect`], and add its line to the
 //! list at the end of this file. Nothing else names effects one by one.
 //!
@@ -29,13 +31,13 @@ pub mod drive_quantisation;
 pub mod drive_saturation;
 pub mod gain_drift;
 pub mod harmonic_n;
+mod moment;
+pub mod over_temperature;
 pub mod rate_offset;
 pub mod scale_drift;
 pub mod scale_temperature;
-pub mod skew_temperature;
 pub mod spring_cubic;
 pub mod table_harmonic;
-pub mod temperature;
 #[cfg(test)]
 mod tests;
 pub mod time_periodic;
@@ -43,6 +45,7 @@ pub mod time_periodic;
 pub mod written;
 
 pub use detection_cubic::Cubic;
+pub use moment::Moment;
 
 /// The most parameters one effect may have.
 pub const MAX_PARAMETERS: usize = 4;
@@ -61,36 +64,6 @@ pub enum Stage {
     Actuation,
     /// on the envelope that the readout makes of the vibration
     Readout,
-}
-
-/// The instant at which an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Moment<T> {
-    /// time of the recording, s
-    pub t_s: T,
-    /// angle of the table, rad
-    pub table_rad: T,
-    /// nominal precession rate −kΩ, rad/s
-    pub precession_rad_s: T,
-    /// temperature over the one that parameters refer to, K
-    pub warmer_k: T,
-    /// what the electronics command the drives of X and Y to, V: what acts while the readout is taken
-    pub drive: AxisForces<T>,
-}
-
-impl<T: Copy> Moment<T> {
-    /// The same instant in another scalar.
-    #[inline]
-    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Moment<U> {
-        let d = &self.drive;
-        Moment {
-            t_s: f(self.t_s),
-            table_rad: f(self.table_rad),
-            precession_rad_s: f(self.precession_rad_s),
-            warmer_k: f(self.warmer_k),
-            drive: AxisForces { x_c: f(d.x_c), x_s: f(d.x_s), y_c: f(d.y_c), y_s: f(d.y_s) },
-        }
-    }
 }
 
 /// One parameter of an effect.
@@ -291,13 +264,13 @@ pub trait Effect: listed::Listed {
 
     /// What the effect adds to the envelope's rate of change, per second.
     #[inline]
-    fn mechanics<T: Real>(_: &Values<T>, _: &Envelope<T>) -> Envelope<T> {
+    fn mechanics<T: Real>(_: &Values<T>, _: &Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         Envelope::zero()
     }
 
     /// The forces that result when `f` is commanded, in volts of command.
     #[inline]
-    fn actuate<T: Real>(_: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    fn actuate<T: Real>(_: &Values<T>, f: AxisForces<T>, _: &Moment<T>) -> AxisForces<T> {
         f
     }
 
@@ -453,21 +426,21 @@ macro_rules! library {
 
             /// [`Effect::mechanics`]
             #[inline]
-            pub fn mechanics<T: Real>(self, p: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+            pub fn mechanics<T: Real>(self, p: &Values<T>, e: &Envelope<T>, at: &Moment<T>) -> Envelope<T> {
                 match self {
-                    $(Self::$name => <$effect as Effect>::mechanics(p, e),)+
+                    $(Self::$name => <$effect as Effect>::mechanics(p, e, at),)+
                     #[cfg(feature = "written")]
-                    Self::WrittenFirst(text) | Self::Written(text) => text.mechanics(p, e),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.mechanics(p, e, at),
                 }
             }
 
             /// [`Effect::actuate`]
             #[inline]
-            pub fn actuate<T: Real>(self, p: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+            pub fn actuate<T: Real>(self, p: &Values<T>, f: AxisForces<T>, at: &Moment<T>) -> AxisForces<T> {
                 match self {
-                    $(Self::$name => <$effect as Effect>::actuate(p, f),)+
+                    $(Self::$name => <$effect as Effect>::actuate(p, f, at),)+
                     #[cfg(feature = "written")]
-                    Self::WrittenFirst(text) | Self::Written(text) => text.actuate(p, f),
+                    Self::WrittenFirst(text) | Self::Written(text) => text.actuate(p, f, at),
                 }
             }
 
@@ -563,25 +536,31 @@ library! {
     ScaleDrift => scale_drift::ScaleDrift,
     ScaleTemperature => scale_temperature::ScaleTemperature,
     Anisodamping => anisodamping::Anisodamping,
+    AnisodampingTemperature => over_temperature::OverTemperature<anisodamping::Anisodamping>,
     Anisoelasticity => anisoelasticity::Anisoelasticity,
+    AnisoelasticityTemperature => over_temperature::OverTemperature<anisoelasticity::Anisoelasticity>,
     SpringCubic => spring_cubic::SpringCubic,
     DriveQuantisation => drive_quantisation::DriveQuantisation,
     DriveSaturation => drive_saturation::DriveSaturation,
     ActuationGainMismatch => actuation_gain_mismatch::ActuationGainMismatch,
+    ActuationGainTemperature => over_temperature::OverTemperature<actuation_gain_mismatch::ActuationGainMismatch>,
     ActuationSkew => actuation_skew::ActuationSkew,
+    ActuationSkewTemperature => over_temperature::OverTemperature<actuation_skew::ActuationSkew>,
     ActuationPhase => actuation_phase::ActuationPhase,
     HarmonicN => harmonic_n::HarmonicN,
     TimePeriodic => time_periodic::TimePeriodic,
     AngleLatency => angle_latency::AngleLatency,
     DetectionCubic => detection_cubic::DetectionCubic,
+    CubicTemperature => over_temperature::OverTemperature<detection_cubic::DetectionCubic>,
     DetectionQuintic => detection_quintic::DetectionQuintic,
     DetectionSkew => detection_skew::DetectionSkew,
-    SkewTemperature => skew_temperature::SkewTemperature,
+    SkewTemperature => over_temperature::OverTemperature<detection_skew::DetectionSkew>,
     DetectionGainMismatch => detection_gain_mismatch::DetectionGainMismatch,
     GainDrift => gain_drift::GainDrift,
-    Temperature => temperature::Temperature,
+    Temperature => over_temperature::OverTemperature<detection_gain_mismatch::DetectionGainMismatch>,
     DetectionPhase => detection_phase::DetectionPhase,
     DriveFeedthrough => drive_feedthrough::DriveFeedthrough,
     DetectionOffset => detection_offset::DetectionOffset,
+    DetectionOffsetTemperature => over_temperature::OverTemperature<detection_offset::DetectionOffset>,
     DetectionSaturation => detection_saturation::DetectionSaturation,
 }

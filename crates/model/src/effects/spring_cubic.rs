@@ -1,7 +1,7 @@
 //! A nonlinear spring, electrostatic or mechanical, that precesses the pattern: θ̇ += p sin(4θ + phase), resolved into
 //! (p cos phase, p sin phase).
 
-use super::{Description, Effect, Scaling, Shown, Stage, Values, fitted};
+use super::{Description, Effect, Moment, Scaling, Shown, Stage, Values, fitted};
 use crate::{Envelope, Real, resonator::envelope::precession};
 
 /// nonlinear spring that precesses the pattern.
@@ -24,7 +24,7 @@ impl Effect for SpringCubic {
     };
 
     #[inline]
-    fn mechanics<T: Real>(&[cos, sin, ..]: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+    fn mechanics<T: Real>(&[cos, sin, ..]: &Values<T>, e: &Envelope<T>, _: &Moment<T>) -> Envelope<T> {
         let p = e.pendulum();
         let (r2, s2) = (p.r * p.r, p.s * p.s);
         let size = r2 + s2;

@@ -37,6 +37,6 @@ fn an_effect_without_an_inverse_of_its_own_is_undone_step_by_step() {
     // each of eight steps leaves a fiftieth
     assert!((back - vibration).pendulum().e.sqrt() < 1e-13, "{back:?}");
     // what it doesn't act on it leaves
-    assert_eq!(Bent::mechanics(&bend, &vibration), Envelope::zero());
+    assert_eq!(Bent::mechanics(&bend, &vibration, &now), Envelope::zero());
     assert_eq!(Bent::input_rate(&bend, 3.0, &now), 3.0);
 }

@@ -214,12 +214,12 @@ impl Written {
     }
 
     /// [`Effect::mechanics`](super::Effect::mechanics)
-    pub fn mechanics<T: Real>(&self, p: &Values<T>, e: &Envelope<T>) -> Envelope<T> {
+    pub fn mechanics<T: Real>(&self, p: &Values<T>, e: &Envelope<T>, at: &Moment<T>) -> Envelope<T> {
         let mut rate = Envelope::zero();
         if self.description.stage != Stage::Mechanics {
             return rate;
         }
-        let scope = Scope { p, e: *e, at: never(), rate: T::zero() };
+        let scope = Scope { p, e: *e, at: *at, rate: T::zero() };
         for (target, steps) in self.maps {
             let value = scope.value(steps);
             match target {
@@ -236,12 +236,12 @@ impl Written {
     }
 
     /// [`Effect::actuate`](super::Effect::actuate)
-    pub fn actuate<T: Real>(&self, p: &Values<T>, f: AxisForces<T>) -> AxisForces<T> {
+    pub fn actuate<T: Real>(&self, p: &Values<T>, f: AxisForces<T>, at: &Moment<T>) -> AxisForces<T> {
         if self.description.stage != Stage::Actuation {
             return f;
         }
         let e = Envelope::new(f.x_c, f.x_s, f.y_c, f.y_s);
-        let e = self.mapped(&Scope { p, e, at: never(), rate: T::zero() });
+        let e = self.mapped(&Scope { p, e, at: *at, rate: T::zero() });
         AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s }
     }
 
@@ -302,13 +302,6 @@ impl Written {
 const INVERSE_STEPS: usize = 40;
 /// Steps after the one that leaves nothing.
 const POLISH: usize = 3;
-
-/// For what does not depend on the moment.
-fn never<T: Real>() -> Moment<T> {
-    let zero = T::zero();
-    let drive = AxisForces { x_c: zero, x_s: zero, y_c: zero, y_s: zero };
-    Moment { t_s: zero, table_rad: zero, precession_rad_s: zero, warmer_k: zero, drive }
-}
 
 fn energy<T: Real>(e: &Envelope<T>) -> T {
     e.x_c * e.x_c + e.x_s * e.x_s + e.y_c * e.y_c + e.y_s * e.y_s

@@ -171,11 +171,11 @@ fn run(id: EffectId) -> Option<Outputs> {
             vec![("rate'", Some(rate), id.input_rate(&p, rate, &at))]
         }
         Stage::Mechanics => {
-            let z = id.mechanics(&p, &e);
+            let z = id.mechanics(&p, &e, &at);
             four(["x_c_rate", "x_s_rate", "y_c_rate", "y_s_rate"], [None; 4], [z.x_c, z.x_s, z.y_c, z.y_s])
         }
         Stage::Actuation => {
-            let f = id.actuate(&p, AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s });
+            let f = id.actuate(&p, AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s }, &at);
             four(primed, own.map(Some), [f.x_c, f.x_s, f.y_c, f.y_s])
         }
         Stage::Readout => {

@@ -43,12 +43,9 @@ const ENVELOPE: [(&str, Variable); 11] = [
     ("R", Variable::R),
     ("S", Variable::S),
 ];
-const MOMENT: [(&str, Variable); 4] = [
-    ("t", Variable::Time),
-    ("table", Variable::Table),
-    ("precession", Variable::Precession),
-    ("warmer", Variable::Warmer),
-];
+const WARMER: (&str, Variable) = ("warmer", Variable::Warmer);
+const MOMENT: [(&str, Variable); 4] =
+    [("t", Variable::Time), ("table", Variable::Table), ("precession", Variable::Precession), WARMER];
 const DRIVE: [(&str, Variable); 6] = [
     ("drive_x", Variable::DriveX),
     ("drive_y", Variable::DriveY),
@@ -63,7 +60,7 @@ const RATE: [(&str, Variable); 1] = [("rate", Variable::Rate)];
 pub(crate) fn variables(stage: Stage) -> Vec<(&'static str, Variable)> {
     match stage {
         Stage::Input => [&RATE[..], &MOMENT[..]].concat(),
-        Stage::Mechanics | Stage::Actuation => ENVELOPE.to_vec(),
+        Stage::Mechanics | Stage::Actuation => [&ENVELOPE[..], &[WARMER]].concat(),
         Stage::Readout => [&ENVELOPE[..], &MOMENT[..], &DRIVE[..]].concat(),
     }
 }

@@ -214,10 +214,10 @@ impl EffectText {
             let size = e.pendulum().e.sqrt();
             let left = match effect.description().stage {
                 Stage::Input => (effect.input_rate(&neutral, 1.0, &at) - 1.0).abs(),
-                Stage::Mechanics => difference(&effect.mechanics(&neutral, &e), &Envelope::zero()) / size,
+                Stage::Mechanics => difference(&effect.mechanics(&neutral, &e, &at), &Envelope::zero()) / size,
                 Stage::Actuation => {
                     let f = AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s };
-                    let out = effect.actuate(&neutral, f);
+                    let out = effect.actuate(&neutral, f, &at);
                     difference(&Envelope::new(out.x_c, out.x_s, out.y_c, out.y_s), &e) / size
                 }
                 Stage::Readout => difference(&effect.read(&neutral, e, &at), &e) / size,
@@ -236,11 +236,12 @@ impl EffectText {
         let values: Values<f64> = std::array::from_fn(|i| {
             self.parameter.get(i).map_or(0.0, |p| p.scale * (0.7 - 1.9 * i as f64) * if p.held { 0.0 } else { 1.0 })
         });
+        let at = Moment { warmer_k: 4.0, ..Moment::origin() };
         let sum = (0..MAX_PARAMETERS).fold(Envelope::zero(), |sum, i| {
             let unit: Values<f64> = std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 });
-            sum + effect.mechanics(&unit, e) * values[i]
+            sum + effect.mechanics(&unit, e, &at) * values[i]
         });
-        let all = effect.mechanics(&values, e);
+        let all = effect.mechanics(&values, e, &at);
         let size = all.pendulum().e.sqrt();
         difference(&all, &sum) <= LINEAR * size && !self.parameter.iter().any(|p| p.held)
     }

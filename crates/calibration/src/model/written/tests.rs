@@ -19,7 +19,8 @@ fn twins(id: EffectId) -> (EffectId, EffectId) {
 
 /// What an effect makes of a sample, all numbers of its stage, with slopes against its parameters and, in the last lane, time.
 fn outputs(id: EffectId, p: &Values<f64>, e: &Envelope<f64>) -> Vec<Jet> {
-    let p: Values<Jet> = std::array::from_fn(|i| Jet::unknown(p[i], i));
+    let count = id.description().parameters.len();
+    let p: Values<Jet> = std::array::from_fn(|i| if i < count { Jet::unknown(p[i], i) } else { Jet::constant(p[i]) });
     let fixed = Jet::constant;
     let drive = AxisForces { x_c: 0.2, x_s: 0.1, y_c: -0.3, y_s: 0.05 };
     let at = Moment { t_s: 3.0, table_rad: 1.2, precession_rad_s: -6.8, warmer_k: 4.0, drive }.map(fixed);
@@ -27,9 +28,9 @@ fn outputs(id: EffectId, p: &Values<f64>, e: &Envelope<f64>) -> Vec<Jet> {
     let four = |e: Envelope<Jet>| vec![e.x_c, e.x_s, e.y_c, e.y_s];
     match id.description().stage {
         Stage::Input => vec![id.input_rate(&p, fixed(4.0), &at)],
-        Stage::Mechanics => four(id.mechanics(&p, &e)),
+        Stage::Mechanics => four(id.mechanics(&p, &e, &at)),
         Stage::Actuation => {
-            let f = id.actuate(&p, AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s });
+            let f = id.actuate(&p, AxisForces { x_c: e.x_c, x_s: e.x_s, y_c: e.y_c, y_s: e.y_s }, &at);
             vec![f.x_c, f.x_s, f.y_c, f.y_s]
         }
         Stage::Readout => [four(id.read(&p, e, &at)), four(id.unread(&p, e, &at))].concat(),

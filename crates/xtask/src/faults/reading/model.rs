@@ -94,7 +94,7 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a map of a moment leaves its temperature",
-        "model/src/effects/mod.rs",
+        "model/src/effects/moment.rs",
         "warmer_k: f(self.warmer_k),",
         "warmer_k: f(self.t_s),",
         EFFECTS,
@@ -121,8 +121,8 @@ pub(super) const FAULTS: &[Fault] = &[
         EFFECTS,
     ),
     fault(
-        "a gain that follows the temperature has no thermometer",
-        "model/src/effects/temperature.rs",
+        "what follows the temperature has no thermometer",
+        "model/src/effects/over_temperature.rs",
         "const BY_TEMPERATURE: bool = true;",
         "const BY_TEMPERATURE: bool = false;",
         EFFECTS,

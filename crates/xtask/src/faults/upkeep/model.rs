@@ -81,10 +81,10 @@ pub(super) const FAULTS: &[Fault] = &[
         EFFECTS,
     ),
     fault(
-        "a gain that follows the temperature is undone to first order",
-        "model/src/effects/temperature.rs",
-        "T::one() / (T::one() + slope * at.warmer_k)",
-        "T::one() - slope * at.warmer_k",
+        "what follows the temperature is undone as if it were at another",
+        "model/src/effects/over_temperature.rs",
+        "E::unread(&at_once::<E, T>(p, at), e, at)",
+        "E::unread(&at_once::<E, T>(p, &Moment::origin()), e, at)",
         EFFECTS,
     ),
     fault(
@@ -138,9 +138,9 @@ pub(super) const FAULTS: &[Fault] = &[
     ),
     fault(
         "a gain falls with the temperature",
-        "model/src/effects/temperature.rs",
-        "y: T::one() + slope * at.warmer_k }",
-        "y: T::one() - slope * at.warmer_k }",
+        "model/src/effects/over_temperature.rs",
+        "slopes.map(|slope| T::one() + by(slope))",
+        "slopes.map(|slope| T::one() - by(slope))",
         EFFECTS,
     ),
     fault(
