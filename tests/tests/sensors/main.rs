@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod angle_sensors;
+mod another_pass;
+mod blocks_held_out;
 mod magnetometers;
 mod one_turn;
 mod part_of_a_turn;

@@ -480,7 +480,11 @@ fn by_loss<M: Ord>(a: &Candidate<M>, b: &Candidate<M>) -> std::cmp::Ordering {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
+    use super::super::samples::Reading;
     use super::*;
+    use crate::recording::Role;
 
     fn candidate(size: usize, model: &'static str, sum: [f64; 4]) -> Candidate<&'static str> {
         Candidate { size, texts: 0, model, losses: Losses { sum: sum.to_vec(), rows: 4.0 }, of_radius: None }
@@ -502,6 +506,36 @@ mod tests {
             }
             // as good as the best within a standard error, the simplest, and of two alike the first by name
             assert_eq!(choose(&candidates, Tolerance::One).map(|c| c.model), Some("lag"));
+        }
+    }
+
+    /// Two of three twelfths of a turn are fitted, or one of two twentieths, or two of three ninths, and the rest is asked for.
+    #[test]
+    fn what_is_left_out_of_blocks_is_about_as_far_from_the_rest_as_what_is_asked_for() {
+        const ROWS: usize = 1800;
+        for (parts, of) in [(12, 3), (20, 2), (9, 3)] {
+            let (held, fitted): (Vec<usize>, Vec<usize>) = (0..ROWS).partition(|row| row * parts / ROWS % of == 1);
+            let angles = |rows: &[usize]| rows.iter().map(|row| TAU * *row as f64 / ROWS as f64).collect::<Vec<f64>>();
+            let still = vec![0.0; fitted.len()];
+            let run = SensorRun {
+                name: "blocks.csv".into(),
+                number: 0,
+                role: Role::Fit,
+                commanded: false,
+                t_s: fitted.iter().map(|row| *row as f64).collect(),
+                reference_rad: angles(&fitted),
+                rate_rad_s: still.clone(),
+                acceleration_rad_s2: still,
+                reading: Reading::Angle(angles(&fitted)),
+                temp_c: None,
+                recorded: None,
+            };
+            let asked = angles(&held);
+            let places = |angles: &[f64]| angles.iter().map(|a| place(*a, 1.0)).collect::<Vec<f64>>();
+            let far = median(&mut distances(&places(&asked), &places(&run.reference_rad)));
+            let left_out =
+                Folds::of(std::slice::from_ref(&run), &asked, 1.0).left_out_from_kept(&places(&run.reference_rad));
+            assert!((0.8..ABOUT_AS_FAR).contains(&(left_out / far)), "{parts}: {left_out} beside {far}");
         }
     }
 

@@ -29,7 +29,7 @@ use crate::diagnostics::decomposition::{Influence, decompose};
 use crate::error::Refusal;
 use crate::identified::{Identification, Options, not_taken, not_tried};
 use crate::model::hypothesis::Hypothesis;
-use crate::numerics::angles::unwrapped;
+use crate::numerics::angles::followed;
 use crate::numerics::statistics::{line, median, span};
 use crate::recording::{Campaign, Instrument, Run, RunKind};
 use crate::report::gate::least_held_out;
@@ -252,7 +252,7 @@ fn require_following(parts: [&[SensorRun]; 2], gain: f64, period: f64) -> Result
     let travel = |run: &SensorRun| travel_of_the_whole(parts, run) * gain.abs();
     let furthest = runs.iter().filter(|r| r.channels().is_none()).max_by(|a, b| travel(a).total_cmp(&travel(b)));
     let Some((run, Reading::Angle(theta))) = furthest.map(|run| (run, &run.reading)) else { return Ok(()) };
-    let slope = line(&run.reference_rad, &unwrapped(theta.iter().copied(), period)).0 / gain;
+    let slope = line(&run.reference_rad, &followed(theta, &run.reference_rad, period)).0 / gain;
     // rows in any order are not followed from one to the next
     let mut steps: Vec<f64> = run.reference_rad.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
     let is_followed = median(&mut steps) < LARGEST_STEP * period;
@@ -315,6 +315,13 @@ fn said_of(
                 .into(),
         );
     }
+    if model.outcome == Outcome::Doubted {
+        warnings.push(
+            "in the rows that were fitted a memory of the noise would explain what was found as well: a held-out run, another pass, \
+             tells that it is the sensor's"
+                .into(),
+        );
+    }
     if model.by_radius {
         warnings.push(
             "the reference was commanded and not measured: the readout is known from the radius of its ellipse alone, and \
@@ -347,6 +354,7 @@ fn identified(
 ) -> Result<(SensorModel, Deviations), Refusal> {
     let mut largest = Kind::CubicPerChannel;
     loop {
+        model = model.told_by_another_pass(runs, held);
         let mut deviations = deviations(&model, &thinned(runs));
         let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
         let told = model.front().map_or(largest, |readout| deviations.told(readout)).min(largest);

@@ -1,6 +1,7 @@
 //! Angle sensors: two channels that read a sine and a cosine, or an angle, against a reference. Resolvers, Hall pairs,
 //! encoders, magnetometers, interferometers.
 mod agreement;
+mod another_pass;
 mod autoregression;
 mod calibrated_rows;
 mod carried;

@@ -30,6 +30,8 @@ const FOLLOWING: f64 = 0.5;
 pub(crate) enum Outcome {
     /// errors were found, and undoing them predicts rows that were not fitted
     Answered,
+    /// … which a memory of the noise explains as well, in the rows that were fitted
+    Doubted,
     /// nothing was found that does
     Neutral,
 }
@@ -87,8 +89,8 @@ impl SensorModel {
         let thinned: Vec<SensorRun> = runs.iter().map(|r| r.thinned(stride)).collect();
         let models: Vec<Self> =
             selected.iter().filter_map(|s| Self::fitted(sensor, &selection, s, &thinned, rails, &starts)).collect();
-        let answered = models.iter().find(|m| m.outcome == Outcome::Answered);
-        answered.or(models.first()).cloned().ok_or_else(refusal)
+        let of = |outcome| models.iter().find(|m| m.outcome == outcome);
+        of(Outcome::Answered).or(of(Outcome::Doubted)).or(models.first()).cloned().ok_or_else(refusal)
     }
 
     /// Takes out of how the angle follows motion what is no further from nothing than its interval. What is left then may be the
@@ -143,7 +145,9 @@ impl SensorModel {
             table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)?;
             (predicted, stands) = (losses.rms(), true);
         }
-        if !stands && let Some((alone, losses)) = selected.readout_alone.as_ref().filter(|(f, _)| f.0 != Kind::Plain) {
+        let readout_alone = selected.readout_alone.as_ref().filter(|(front, _)| front.0 != Kind::Plain);
+        let outcome = if stands || readout_alone.is_some() { Outcome::Answered } else { Outcome::Doubted };
+        if !stands && let Some((alone, losses)) = readout_alone {
             // what the memory of the noise explains as well is no table; a readout shows in the radius, too
             let (found, weighting) = with(alone)?;
             let raw = Readout { rails, ..Readout::plain() };
@@ -158,10 +162,11 @@ impl SensorModel {
         }
         let predicted_raw = selected.raw.as_ref().map(Losses::rms);
         let follows = predicted < FOLLOWING * sensor.period / 12f64.sqrt();
-        let helps = follows && predicted_raw.is_none_or(|raw| predicted < raw) && stands;
+        let helps =
+            follows && predicted_raw.is_none_or(|raw| predicted < raw) && (stands || outcome == Outcome::Doubted);
         let model = Self {
             sensor,
-            outcome: Outcome::Answered,
+            outcome,
             readout,
             table,
             predicted,
@@ -173,7 +178,7 @@ impl SensorModel {
     }
 
     /// The sensor as it is.
-    fn neutral(self, runs: &[SensorRun]) -> Self {
+    pub(super) fn neutral(self, runs: &[SensorRun]) -> Self {
         let shape = Shape::constant(self.sensor.free_gain);
         let samples = self.sensor.samples(runs, None);
         let table = TableFit::new(&shape, &samples, runs.len(), self.sensor.cycles).unwrap_or(self.table);

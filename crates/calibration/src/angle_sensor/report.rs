@@ -254,7 +254,9 @@ pub(crate) fn report(
     };
     let hypothesis = if neutral { finding.neutral_hypothesis } else { finding.hypothesis };
     let calibration = head.calibration(hypothesis, fitted);
-    if !neutral {
+    if neutral {
+        gate::finite(&report, facts)?;
+    } else {
         gate::pass(&report, &calibration, facts)?;
     }
     Ok(Identification { report, calibration, figures, steps: Vec::new(), plots })

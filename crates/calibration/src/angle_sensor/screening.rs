@@ -10,7 +10,7 @@ use crate::data::copies::{copied_rows, said};
 use crate::data::interpolated::{self, interpolated_rows};
 use crate::data::plausibility::MOST_LOST;
 use crate::error::Refusal;
-use crate::numerics::angles::{unwrapped, wrapped};
+use crate::numerics::angles::followed;
 use crate::numerics::statistics::{line, median, robust_deviation};
 
 /// Share of the runs that may be left out.
@@ -131,16 +131,6 @@ fn channels(run: &SensorRun) -> (Vec<f64>, Vec<f64>) {
     run.channels().into_iter().flatten().map(|z| (z[0], z[1])).unzip()
 }
 
-/// An angle followed through its period beside what it usually turns from row to row: between rows that are far apart it goes on as its
-/// reference does.
-fn followed(reference: &[f64], theta: &[f64], period: f64) -> Vec<f64> {
-    let steps = reference.windows(2).zip(theta.windows(2)).map(|(a, t)| (a[1] - a[0], wrapped(t[1] - t[0], period)));
-    let mut slopes: Vec<f64> = steps.filter(|(by, _)| *by != 0.0).map(|(by, turned)| turned / by).collect();
-    let usual = if slopes.is_empty() { 0.0 } else { median(&mut slopes) };
-    let beside = unwrapped(theta.iter().zip(reference).map(|(t, a)| wrapped(t - usual * a, period)), period);
-    beside.into_iter().zip(reference).map(|(e, a)| e + usual * a).collect()
-}
-
 /// How the angle of a run goes with its reference, by the ellipse of the run alone.
 fn follows(run: &SensorRun, stated: Option<f64>, period: f64) -> Follows {
     let theta: Vec<f64> = match &run.reading {
@@ -150,7 +140,7 @@ fn follows(run: &SensorRun, stated: Option<f64>, period: f64) -> Follows {
             v.iter().map(|z| readout.angle(*z)).collect()
         }
     };
-    let followed = followed(&run.reference_rad, &theta, period);
+    let followed = followed(&theta, &run.reference_rad, period);
     let (slope, intercept) = line(&run.reference_rad, &followed);
     let size = stated.map_or(slope.abs(), f64::abs).max(1.0);
     let mut steps: Vec<f64> = run.reference_rad.windows(2).map(|w| size * (w[1] - w[0]).abs()).collect();

@@ -9,7 +9,7 @@ use super::samples::{Reading, SensorRun};
 use super::table_fit::Sample;
 use super::units::{COUNTS, UNITS, Unit, by_gain, or_smaller};
 use crate::error::Refusal;
-use crate::numerics::angles::{unwrapped, wrapped};
+use crate::numerics::angles::{followed, wrapped};
 use crate::numerics::linear::NormalEquations;
 use crate::numerics::statistics::{circular_mean, line, median, root_mean_square, span};
 
@@ -268,7 +268,7 @@ fn longest(runs: &[SensorRun], period: f64) -> Option<(&[f64], Vec<f64>)> {
             v.iter().map(|z| start.angle(*z)).collect()
         }
     };
-    Some((&longest.reference_rad, unwrapped(theta.into_iter(), period)))
+    Some((&longest.reference_rad, followed(&theta, &longest.reference_rad, period)))
 }
 
 /// Whether |gain|, which a line alone says is `size`, could be the whole number next to it: by the slope of the followed angle beside errors

@@ -13,7 +13,7 @@ use super::rails::Rails;
 use super::readout::Readout;
 use super::samples::{Reading, SensorRun};
 use crate::data::plausibility::{MOST_LOST, places, stretches};
-use crate::numerics::angles::{unwrapped, wrapped};
+use crate::numerics::angles::{followed, wrapped};
 use crate::numerics::statistics::{line, median, robust_deviation, span};
 
 /// A run of fewer rows has no usual distance from its ellipse.
@@ -176,7 +176,7 @@ fn leap_of_each(theta: &[f64], reference: &[f64], period: f64) -> Option<(Vec<f6
     if span(reference) <= 0.0 {
         return None;
     }
-    let theta = unwrapped(theta.iter().copied(), period);
+    let theta = followed(theta, reference, period);
     let (gain, _) = line(reference, &theta);
     let mut steps: Vec<f64> = reference.windows(2).map(|w| (gain * (w[1] - w[0])).abs()).collect();
     let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;

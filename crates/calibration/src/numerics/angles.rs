@@ -1,5 +1,7 @@
 //! Angles that begin anew at each period.
 
+use super::statistics::median;
+
 /// The representative of `angle` in [−period/2, period/2].
 #[inline]
 pub(crate) fn wrapped(angle: f64, period: f64) -> f64 {
@@ -22,7 +24,8 @@ pub(crate) fn unwrapped_beside(angles: &[f64], other: &[f64], period: f64) -> Ve
     let step = |v: &[f64], i: usize| v[i] - v[i - 1];
     let is_long = |i: usize| step(other, i).abs() > 0.25 * period;
     let together = |i: usize| wrapped(step(angles, i), period) * step(other, i);
-    let sense = (1..angles.len()).filter(|i| !is_long(*i)).map(together).sum::<f64>().signum();
+    // where every step is long nothing tells, and a sum of nothing is −0
+    let sense = if (1..angles.len()).filter(|i| !is_long(*i)).map(together).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
     let mut out: Vec<f64> = Vec::with_capacity(angles.len());
     for (i, raw) in angles.iter().enumerate() {
         let expected = match out.last() {
@@ -33,6 +36,19 @@ pub(crate) fn unwrapped_beside(angles: &[f64], other: &[f64], period: f64) -> Ve
         out.push(expected + wrapped(raw - expected, period));
     }
     out
+}
+
+/// Steps of a reference below this share of their mean do not tell how far an angle turns with it: engineering choice.
+const TELLS: f64 = 0.1;
+
+/// The same beside a reference that it turns any number of times as far as: as often as it does from row to row, in the median.
+pub(crate) fn followed(angles: &[f64], reference: &[f64], period: f64) -> Vec<f64> {
+    let steps: Vec<(f64, f64)> =
+        reference.windows(2).zip(angles.windows(2)).map(|(a, t)| (a[1] - a[0], wrapped(t[1] - t[0], period))).collect();
+    let least = TELLS * steps.iter().map(|(by, _)| by.abs()).sum::<f64>() / steps.len().max(1) as f64;
+    let told = steps.iter().filter(|(by, _)| by.abs() > least);
+    let usual = median(&mut told.map(|(by, turned)| turned / by).collect::<Vec<_>>());
+    unwrapped_beside(angles, &reference.iter().map(|a| usual * a).collect::<Vec<_>>(), period)
 }
 
 /// A phase off nothing, or off half a turn, by no more than rounding is that.
@@ -80,6 +96,29 @@ mod tests {
             let followed = unwrapped_beside(&read, &other, TAU);
             let off = followed.iter().zip(&turned).map(|(is, was)| is - was - (followed[0] - turned[0]));
             assert!(off.into_iter().all(|off| off.abs() < 1e-12), "{followed:?}");
+        }
+    }
+
+    #[test]
+    fn an_angle_that_turns_by_nearly_half_a_period_a_row_is_followed_the_way_that_is_nearer() {
+        let reference: Vec<f64> = (0..100).map(|i| 0.03 * f64::from(i)).collect();
+        for gain in [90.0, -90.0] {
+            let read: Vec<f64> = reference.iter().map(|a| (gain * a).rem_euclid(TAU)).collect();
+            let off = followed(&read, &reference, TAU).into_iter().zip(&reference).map(|(is, a)| (is - gain * a).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-9, "{gain}");
+        }
+    }
+
+    #[test]
+    fn an_angle_is_followed_through_gaps_of_more_than_half_a_period_at_any_gain() {
+        // 40 stations of every 80 are missing, and each is read three times
+        for gain in [1.0, -1.0, 4.0] {
+            let row = |i: i32| 0.15 * f64::from(i / 3) / gain + 1e-6 * f64::from(i % 3);
+            let reference: Vec<f64> = (0..900).filter(|i| i % 240 < 120).map(row).collect();
+            let turned: Vec<f64> = reference.iter().map(|a| gain * a + 0.1 * a.sin()).collect();
+            let read: Vec<f64> = turned.iter().map(|a| a.rem_euclid(TAU)).collect();
+            let off = followed(&read, &reference, TAU).into_iter().zip(&turned).map(|(is, was)| (is - was).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-9, "{gain}");
         }
     }
 }

@@ -54,12 +54,7 @@ pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> 
             "a longer run, or one with use = \"holdout\"",
         );
     }
-    if let Some(what) = unreal(report, facts) {
-        return refuse(
-            format!("the fit of {what} did not converge to a number"),
-            "other runs, or fewer of them at once",
-        );
-    }
+    finite(report, facts)?;
     if facts.tells_gain {
         angular_gain(report, facts)?;
     }
@@ -87,6 +82,17 @@ pub(crate) fn pass(report: &Report, calibration: &Calibration, facts: Facts) -> 
         return refuse(format!("what was found is no calibration: {why}"), "other runs");
     }
     Ok(())
+}
+
+/// Whether every number of a report is one, whether something is undone or nothing.
+///
+/// # Errors
+/// [`Refusal`] without an answer, with what is none.
+pub(crate) fn finite(report: &Report, facts: Facts) -> Result<(), Refusal> {
+    unreal(report, facts).map_or(Ok(()), |what| {
+        let problem = format!("the fit of {what} did not converge to a number");
+        Err(Refusal::no_answer(&report.device, problem, "other runs, or fewer of them at once"))
+    })
 }
 
 /// The first number of a report that is none.

@@ -50,8 +50,10 @@ pub(super) const FAULTS: &[Fault] = &[
     fault(
         "the gain warms up behind the lag between the channels",
         LIST,
-        "    Temperature => temperature::Temperature,\n    DetectionPhase => detection_phase::DetectionPhase,",
-        "    DetectionPhase => detection_phase::DetectionPhase,\n    Temperature => temperature::Temperature,",
+        "    Temperature => over_temperature::OverTemperature<detection_gain_mismatch::DetectionGainMismatch>,\n    \
+         DetectionPhase => detection_phase::DetectionPhase,",
+        "    DetectionPhase => detection_phase::DetectionPhase,\n    \
+         Temperature => over_temperature::OverTemperature<detection_gain_mismatch::DetectionGainMismatch>,",
         EFFECTS,
     ),
     fault(
