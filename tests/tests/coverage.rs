@@ -16,8 +16,8 @@ use cvg_tests::bench::{
 };
 
 /// Trials without `CVG_TRIALS`, under white noise and otherwise.
-const TRIALS: u64 = 16;
-const OTHER_TRIALS: u64 = 8;
+const TRIALS: u64 = 24;
+const OTHER_TRIALS: u64 = 12;
 /// What a 95 % interval may hold in the long run.
 const LOWEST_COVERAGE: f64 = 0.92;
 const HIGHEST_COVERAGE: f64 = 0.98;
