@@ -6,10 +6,10 @@
 //!   \begin{pmatrix}\Phi&\Gamma\\0&1\end{pmatrix} = \exp\left[\begin{pmatrix}A&B\\0&0\end{pmatrix}T\right],$$
 //!
 //! computed once for a rate and a period: a step is 4×8 multiplications and additions, and its only error is rounding.
-//! What the matrix cannot hold (a rate that deviates from the nominal one, mechanics that are nonlinear or follow the temperature) acts in half steps on
-//! either side of it (Strang splitting, error of third order in the step).
+//! What the matrix cannot hold (a rate that deviates from the nominal one, mechanics that are nonlinear or follow the
+//! temperature) acts in half steps on either side of it (Strang splitting, error of third order in the step).
 //!
-//! It refuses to know time: whoever steps it says what the rate deviation is.
+//! It refuses to keep time: whoever steps it says what the rate deviation is, and at what moment.
 
 use cvg_model::effects::Moment;
 use cvg_model::resonator::Resonator;

@@ -178,7 +178,7 @@ impl Evaluated {
     }
 }
 
-/// Reads the held-out rows, once, and reports.
+/// Reads the held-out rows, which nothing but a model in doubt has met before, and reports.
 ///
 /// # Errors
 /// Where what was found does not pass the gate.
