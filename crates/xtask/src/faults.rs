@@ -26,6 +26,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use crate::source;
+
 /// Seconds after which a build or a test does not end any more.
 const MOST_S: &str = "600";
 
@@ -104,8 +106,8 @@ pub(crate) fn run(request: &Request<'_>) -> crate::Outcome {
     let all = library();
     let mut chosen = chosen(&all, request);
     if request.most_s.is_some() {
-        let commit = git(&["rev-parse", "HEAD"])?;
-        let changed = git(&["diff", "--name-only", "HEAD^"]).or_else(|_| git(&["ls-files"]))?;
+        let commit = source::git(&["rev-parse", "HEAD"])?;
+        let changed = source::git(&["diff", "--name-only", "HEAD^"]).or_else(|_| source::git(&["ls-files"]))?;
         draw(&mut chosen, commit.trim(), &changed.lines().collect());
     }
     let tree = crate::repository().join("target/faults/tree");
@@ -153,28 +155,10 @@ fn chosen(all: &[Fault], request: &Request<'_>) -> Vec<Fault> {
     all.iter().filter(only).skip(request.from).step_by(request.every.max(1)).copied().collect()
 }
 
-/// What git says.
-fn git(arguments: &[&str]) -> Result<String, String> {
-    let output =
-        Command::new("git").args(arguments).current_dir(crate::repository()).output().map_err(|e| e.to_string())?;
-    if output.status.success() {
-        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-    } else {
-        Err(format!("git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr)))
-    }
-}
-
 /// Puts faults in the order in which they are planted until time is up: those in changed files first; then layer by layer,
 /// which are built once, in an order that the commit draws. The interface for C is last: it takes longest to build.
 fn draw(faults: &mut [Fault], commit: &str, changed: &BTreeSet<&str>) {
-    let drawn = |text: &str| {
-        // FNV-1a, and a last mixing: names that differ in their end are to be far apart
-        let sum = commit
-            .bytes()
-            .chain(text.bytes())
-            .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-        (sum ^ (sum >> 31)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-    };
+    let drawn = |text: &str| source::drawn(commit, text);
     faults.sort_by_cached_key(|f| {
         let is_changed = changed.contains(format!("crates/{}", f.file).as_str());
         (!is_changed, f.layer.0 == "cvg-capi", drawn(&format!("{} {}", f.layer.0, f.layer.1)), f.layer, drawn(f.name))

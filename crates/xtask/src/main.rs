@@ -1,7 +1,7 @@
 //! What the repository can do for itself.
 //!
 //! ```sh
-//! cargo xtask prove [--only TEXT]   # the bit-precise harnesses, by CBMC on the compiled code
+//! cargo xtask prove [--only TEXT | --seconds N | --record]   # the bit-precise harnesses, by CBMC on the compiled code
 //! cargo xtask audit                 # every equation, every requirement, and what this run says of it
 //! cargo xtask faults [--only TEXT]... [--every N [--from K]] [--seconds N]   # faults that an engineer makes, planted; tests have to catch each
 //! ```
@@ -15,7 +15,7 @@ mod source;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: cargo xtask prove [--only TEXT] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER] | \
+const USAGE: &str = "usage: cargo xtask prove [--only TEXT | --seconds N | --record] | cargo xtask audit [--keep-proofs] [--only TEXT] [--out FOLDER] | \
      cargo xtask faults [--only TEXT]... [--every N [--from K]] [--seconds N]";
 
 /// What a task returns: whether everything held, or why it could not be found out.
@@ -41,6 +41,18 @@ fn request<'a>(options: &[&'a str]) -> Option<audit::Request<'a>> {
     Some(request)
 }
 
+/// What `cargo xtask prove` is asked for.
+fn proved<'a>(options: &[&'a str]) -> Option<prove::Request<'a>> {
+    let nothing = prove::Request::default();
+    match *options {
+        [] => Some(nothing),
+        ["--record"] => Some(prove::Request { record: true, ..nothing }),
+        ["--only", text] => Some(prove::Request { only: Some(text), ..nothing }),
+        ["--seconds", n] => Some(prove::Request { most_s: Some(n.parse().ok()?), ..nothing }),
+        _ => None,
+    }
+}
+
 /// What `cargo xtask faults` is asked for.
 fn planted(options: &[&str]) -> Outcome {
     let mut request = faults::Request::default();
@@ -64,8 +76,7 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let outcome = match arguments[..] {
-        ["prove"] => prove::run(None),
-        ["prove", "--only", text] => prove::run(Some(text)),
+        ["prove", ref options @ ..] => proved(options).map_or_else(|| Err(USAGE.to_owned()), prove::run),
         ["faults", ref options @ ..] => planted(options),
         ["audit", ref options @ ..] => request(options).map_or_else(|| Err(USAGE.to_owned()), audit::run),
         _ => Err(USAGE.to_owned()),

@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// A requirement as a function cites it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -184,6 +185,27 @@ pub(crate) fn rust_files(folder: &Path) -> Vec<PathBuf> {
 pub(crate) fn read(repository: &Path, file: &Path) -> Result<Vec<Function>, String> {
     let text = fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
     Ok(functions(file.strip_prefix(repository).unwrap_or(file), &text))
+}
+
+/// What git says.
+pub(crate) fn git(arguments: &[&str]) -> Result<String, String> {
+    let output =
+        Command::new("git").args(arguments).current_dir(crate::repository()).output().map_err(|e| e.to_string())?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(format!("git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr)))
+    }
+}
+
+/// A number that a commit draws for a text: another for each.
+pub(crate) fn drawn(commit: &str, text: &str) -> u64 {
+    // FNV-1a, and a last mixing: names that differ in their end are to be far apart
+    let sum = commit
+        .bytes()
+        .chain(text.bytes())
+        .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    (sum ^ (sum >> 31)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 #[cfg(test)]

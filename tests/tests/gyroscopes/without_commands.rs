@@ -89,7 +89,7 @@ fn read_with_harmonics(rate_dps: f64, noise: &mut Noise) -> Recording {
 /// 0.657 ± 0.011 was told of drives that have none.
 #[test]
 fn a_fourth_harmonic_is_no_ratio_of_the_drives() {
-    all(trials(12), |seed| {
+    all(trials(6), |seed| {
         let mut noise = Noise::new(seed);
         let runs = [(200.0, Role::Fit), (-150.0, Role::Fit), (300.0, Role::Holdout)];
         let runs = runs.map(|(rate, role)| run(&format!("{rate}.csv"), role, read_with_harmonics(rate, &mut noise)));

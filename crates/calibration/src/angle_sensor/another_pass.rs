@@ -1,35 +1,32 @@
 //! What a memory of the noise explains as well in the rows that were fitted, told by a pass in which no memory reaches: a run of its own
-//! that was held out. A table of that run costs nothing there, for nothing of it was fitted.
+//! that was held out. A table of that run costs nothing there, for nothing of it was fitted. It is a condition of the gate, beside that
+//! what was found helps on held-out rows at all.
 
 use super::autoregression;
-use super::model::{Outcome, SensorModel};
+use super::readout_fit::centre;
 use super::samples::SensorRun;
-use super::table_fit::by_run;
+use crate::diagnostics::evaluate::Evaluation;
 use crate::numerics::statistics::root_mean_square;
 
 /// Gain in ln likelihood, beside a memory, from which on another pass tells: engineering choice. Tables of noise alone, with any memory,
 /// gain more in another pass of it once in 200 cases.
 const TELLS: f64 = 6.0;
 
-impl SensorModel {
-    /// A model that is in doubt is kept where another pass tells what was found, and is the sensor as it is elsewhere.
-    pub(super) fn told_by_another_pass(self, fitted: &[SensorRun], held: &[SensorRun]) -> Self {
-        if self.outcome != Outcome::Doubted || self.is_told_by(held.iter().filter(|run| is_another_pass(run, fitted))) {
-            return self;
-        }
-        self.neutral(fitted)
-    }
-
-    fn is_told_by<'a>(&self, passes: impl Iterator<Item = &'a SensorRun>) -> bool {
-        let about_mean = |run: &SensorRun, readout, left: bool| {
-            let samples = self.sensor.samples(std::slice::from_ref(run), readout);
-            by_run(&samples, 1, |s| if left { self.table.left(s) } else { s.error }).concat()
+/// Whether held-out runs that are passes of their own tell what was found: by the errors of all held-out runs as recorded, and by what is
+/// left of them.
+pub(super) fn tells(fitted: &[SensorRun], held: &[SensorRun], raw: &Evaluation, left: &Evaluation) -> bool {
+    let passes: Vec<usize> = (0..held.len()).filter(|&run| is_another_pass(&held[run], fitted)).collect();
+    let about_mean = |errors: &Evaluation| -> Vec<Vec<f64>> {
+        let of = |&run: &usize| {
+            let mut angle = errors.segments[run].angle.clone();
+            centre(&mut angle);
+            angle
         };
-        let errors = |run| (about_mean(run, None, false), about_mean(run, self.front(), true));
-        let (before, after): (Vec<Vec<f64>>, Vec<Vec<f64>>) = passes.map(errors).unzip();
-        root_mean_square(&after.concat()) < root_mean_square(&before.concat())
-            && autoregression::gain(&before, &after, 0) > TELLS
-    }
+        passes.iter().map(of).collect()
+    };
+    let [before, after] = [raw, left].map(about_mean);
+    root_mean_square(&after.concat()) < root_mean_square(&before.concat())
+        && autoregression::gain(&before, &after, 0) > TELLS
 }
 
 /// Whether a held-out run is none of those that were fitted, nor rows that were taken out of one.

@@ -173,8 +173,11 @@ fn of_texts_held_by_table(model: &SensorModel, runs: &[SensorRun]) -> Vec<f64> {
     readout.texts.iter().enumerate().flat_map(of_text).collect()
 }
 
-/// What a table beside the readout may hold of its parameters.
+/// What a table beside the readout may hold of its parameters: nothing where the radius alone told them.
 fn held_by_table(model: &SensorModel) -> [f64; 6] {
+    if model.by_radius {
+        return [0.0; 6];
+    }
     let table = &model.table.table;
     let harmonic = |n: usize| {
         let [cos, sin] = [&table.cos, &table.sin].map(|v| v.get(n - 1).copied().unwrap_or(0.0));

@@ -133,9 +133,9 @@ impl Described<'_> {
     }
 
     fn evidence(&self) -> String {
-        let of = if self.model.by_radius { "of the radius" } else { "of the angle" };
-        let degrees =
-            |v: f64| if self.model.by_radius { format!("{v:.4}") } else { format!("{:.4}°", v.to_degrees()) };
+        let of_radius = self.model.by_radius && self.model.table.shape.size() == 0;
+        let of = if of_radius { "of the radius" } else { "of the angle" };
+        let degrees = |v: f64| if of_radius { format!("{v:.4}") } else { format!("{:.4}°", v.to_degrees()) };
         let before = self.model.predicted_raw.map_or(String::new(), |raw| format!(", {} as recorded", degrees(raw)));
         format!(
             "blocked cross-validation within the fitted rows leaves {} {of} with all that was found{before}; interval by \
@@ -225,7 +225,7 @@ impl Described<'_> {
     }
 
     /// What a compensation undoes: readout, following of motion, table. Lines belong to the reference and not to the
-    /// sensor, and are left out.
+    /// sensor, and are left out, as is a table against a command, which may be the drive's.
     pub(crate) fn hypothesis(&self, sense: Option<f64>) -> Hypothesis {
         let m = self.model;
         let gain = self.angular_gain(sense).value;
@@ -254,7 +254,7 @@ impl Described<'_> {
                 admit(EffectId::AngleLatency, m.origin_of_motion(), [-side[0] / m.sensor.gain, 0.0, 0.0, 0.0]);
             }
         }
-        h.angle_table = (!m.table.table.cos.is_empty()).then(|| m.table.table.clone());
+        h.angle_table = (!m.by_radius && !m.table.table.cos.is_empty()).then(|| m.table.table.clone());
         h.clip = m.front().and_then(clip);
         h
     }

@@ -315,13 +315,6 @@ fn said_of(
                 .into(),
         );
     }
-    if model.outcome == Outcome::Doubted {
-        warnings.push(
-            "in the rows that were fitted a memory of the noise would explain what was found as well: a held-out run, another pass, \
-             tells that it is the sensor's"
-                .into(),
-        );
-    }
     if model.by_radius {
         warnings.push(
             "the reference was commanded and not measured: the readout is known from the radius of its ellipse alone, and \
@@ -329,6 +322,11 @@ fn said_of(
              campaign.toml lets the angle tell as well"
                 .into(),
         );
+        if !model.table.table.cos.is_empty() {
+            warnings.push(
+                "what repeats against the command is taken off in the errors stated and is no part of the calibration: it may be the drive's".into(),
+            );
+        }
     }
     Ok(warnings)
 }
@@ -354,7 +352,6 @@ fn identified(
 ) -> Result<(SensorModel, Deviations), Refusal> {
     let mut largest = Kind::CubicPerChannel;
     loop {
-        model = model.told_by_another_pass(runs, held);
         let mut deviations = deviations(&model, &thinned(runs));
         let unsure = model.front().map(|readout| deviations.texts_not_told(readout)).unwrap_or_default();
         let told = model.front().map_or(largest, |readout| deviations.told(readout)).min(largest);
@@ -444,6 +441,7 @@ fn sensor_finding(
         instrument: Instrument::Sensor,
         stated_gain: stated,
         reason: neutral.then(|| nothing_predicts(runs)),
+        in_doubt: model.outcome == Outcome::Doubted,
         angular_gain: described.angular_gain(sense),
         detection_gain_ratio: gain_ratio,
         effects: with_the_interval(described.effects(), all)

@@ -1,26 +1,24 @@
 //! The identified sensor: what was selected, fitted to all rows, with the checks that decide whether it is an answer.
 
+use super::autoregression;
 use super::circle;
-use super::cross_validation::{Candidate, Folds, Losses, Tolerance, choose, losses_of_radius};
+use super::commanded;
+use super::cross_validation::Losses;
 use super::deviations::Deviations;
 use super::lines::alias_elsewhere;
 use super::rails::Rails;
 use super::readout::{Competing, Kind, Readout};
-use super::readout_fit::{Weighting, fit, starts};
+use super::readout_fit::{Weighting, starts};
 use super::samples::SensorRun;
 use super::selection::{Front, Selected, Selection, fit_from};
 use super::sensor::Sensor;
 use super::table_fit::{Motion, Shape, TableFit, by_run};
-use super::{autoregression, ellipse};
 use crate::diagnostics::decomposition::STUDENT_19;
 use crate::error::Refusal;
 use crate::model::hypothesis::Origin;
 
 /// Rows of the last fit; more would not narrow what still means something.
 const ENOUGH_ROWS: usize = 100_000;
-/// What an ellipse may leave of the radius, rms, where nothing else tells the readout: engineering choice.
-const LARGEST_RADIUS_ERROR: f64 = 0.25;
-
 /// An angle that follows its reference is off by less than this share of what an angle at random is, a period over √12:
 /// engineering choice.
 const FOLLOWING: f64 = 0.5;
@@ -45,10 +43,10 @@ pub(crate) struct SensorModel {
     pub(crate) readout: Option<(Readout, Weighting)>,
     pub(crate) table: TableFit,
     /// cross-validated rms of what was selected and of the sensor as it is, rad; of the radius where the reference is
-    /// commanded
+    /// commanded and nothing repeats against it
     pub(crate) predicted: f64,
     pub(crate) predicted_raw: Option<f64>,
-    /// the reference was not believed: only the radius was
+    /// the reference was commanded and not believed: the readout is known from the radius alone, and a table is the sensor's or the drive's
     pub(crate) by_radius: bool,
     /// what goes with the motion is told from what goes with the position, for positions were met again at another
     pub(crate) tells_motion: bool,
@@ -68,11 +66,21 @@ impl SensorModel {
     ) -> Result<Self, Refusal> {
         let sensor = Sensor::new(stated_gain, period, runs)?;
         if runs.iter().all(|r| r.commanded && r.channels().is_some()) {
-            return Self::by_radius(sensor, runs);
+            return commanded::identify(sensor, runs, asked);
         }
         let believed: Vec<SensorRun> = runs.iter().filter(|r| !r.commanded).cloned().collect();
         let runs = if believed.is_empty() { runs } else { &believed };
         let sensor = Sensor::new(stated_gain, period, runs)?;
+        Self::chosen(sensor, runs, competing, asked)
+    }
+
+    /// Chooses and fits a model of a sensor whose gain is known.
+    pub(super) fn chosen(
+        sensor: Sensor,
+        runs: &[SensorRun],
+        competing: Competing<'_>,
+        asked: &[f64],
+    ) -> Result<Self, Refusal> {
         let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
         let starts = starts(runs, sensor.gain);
         let mut selection = Selection::new(&sensor, runs, rails, &starts, competing, asked);
@@ -184,50 +192,6 @@ impl SensorModel {
         let table = TableFit::new(&shape, &samples, runs.len(), self.sensor.cycles).unwrap_or(self.table);
         let readout = self.readout.map(|(_, w)| (Readout::plain(), w));
         Self { outcome: Outcome::Neutral, readout, table, ..self }
-    }
-
-    /// The readout from the radius alone: of a commanded reference nobody knows what the table did with it.
-    fn by_radius(sensor: Sensor, runs: &[SensorRun]) -> Result<Self, Refusal> {
-        let refuse = |what: String| Refusal::no_answer("campaign", what, "two channels that draw an ellipse");
-        let rails = Rails::of(runs.iter().filter_map(SensorRun::channels).flatten());
-        let start = ellipse::algebraic(runs).ok_or_else(|| refuse("the channels draw no ellipse".into()))?;
-        let start = Readout { rails, ..start };
-        let folds = Folds::interleaved(runs);
-        let candidates: Vec<Candidate<Kind>> = [Kind::Offset, Kind::Affine]
-            .into_iter()
-            .filter_map(|kind| {
-                let without = |fold: usize| {
-                    let kept = folds.without(runs, fold);
-                    fit(kind, Weighting::Radius, &kept, sensor.gain, &start).map(|f| f.readout)
-                };
-                let losses = losses_of_radius(without, &folds, runs)?;
-                Some(Candidate { size: kind.free().len(), texts: 0, model: kind, losses, of_radius: None })
-            })
-            .collect();
-        let chosen =
-            choose(&candidates, Tolerance::One).ok_or_else(|| refuse("no ellipse fits the channels".into()))?;
-        if chosen.losses.rms() > LARGEST_RADIUS_ERROR {
-            return Err(refuse(format!("the best ellipse leaves {:.2} of the radius", chosen.losses.rms())));
-        }
-        let fitted = fit(chosen.model, Weighting::Radius, runs, sensor.gain, &start);
-        let readout = fitted.ok_or_else(|| refuse("no ellipse fits the channels".into()))?.readout;
-        if let Some(what) = circle::said_of(&sensor, runs) {
-            return Err(Refusal::no_answer("campaign", what, "the channels as they were converted"));
-        }
-        let samples = sensor.samples(runs, Some(&readout));
-        let shape = Shape::constant(false);
-        let table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)
-            .ok_or_else(|| refuse("the angle cannot be followed".into()))?;
-        Ok(Self {
-            sensor,
-            outcome: Outcome::Answered,
-            readout: Some((readout, Weighting::Radius)),
-            table,
-            predicted: chosen.losses.rms(),
-            predicted_raw: None,
-            by_radius: true,
-            tells_motion: false,
-        })
     }
 
     /// How a lag came in: where positions are not met again at another rate, it describes what goes with either.

@@ -98,6 +98,7 @@ pub(super) fn rate_finding(
         reason: (!model.answered).then(|| {
             "bias, scale factor and lag predict parts of the runs that were left out worse than nothing does".into()
         }),
+        in_doubt: false,
         angular_gain: Estimate { value, ci95: [value - half_width, value + half_width] },
         detection_gain_ratio: None,
         effects: rate_effects(&model).into_iter().chain(thermal.as_ref().map(BiasOverTemperature::effect)).collect(),

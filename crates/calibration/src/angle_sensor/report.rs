@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 
 use super::calibrated_rows::{covered_deg, radius_left};
 use super::curve::Curve;
+use super::evaluated::Evaluated;
 use super::rate_alone::Alone;
 use super::rate_runs::at_rest;
 use super::readout::Readout;
@@ -15,12 +16,11 @@ use crate::diagnostics::plots::{PlotData, plots_of};
 use crate::diagnostics::residual::reported_harmonics;
 use crate::diagnostics::temperature::{Seen, temperature};
 use crate::error::Refusal;
-use crate::estimation::residuals::Residual;
 use crate::facts::Follows;
 use crate::identified::{BiasCurve, Figures, Identification};
 use crate::model::hypothesis::{Hypothesis, Origin};
 use crate::numerics::linear::NormalEquations;
-use crate::numerics::statistics::{median, root_mean_square};
+use crate::numerics::statistics::root_mean_square;
 use crate::recording::{Campaign, Instrument, RunKind};
 use crate::report::calibration::{Calibration, Provenance};
 use crate::report::gate::{self, Facts};
@@ -30,8 +30,8 @@ use crate::report::repeatability::of_the_gain;
 use crate::report::stages::stages;
 use crate::report::unexplained::{against_a_command, left_over, residual_report};
 use crate::report::{
-    EffectReport, Estimate, Heldout, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport,
-    Temperature, Tool, Unexplained,
+    EffectReport, Estimate, Input, Report, RunReport, SCHEMA, ScaleFactor, Share, Status, StepReport, Temperature,
+    Tool, Unexplained,
 };
 
 /// Errors of a run at one stage, rad.
@@ -47,6 +47,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) stated_gain: Option<f64>,
     /// why nothing is undone, where nothing is
     pub(crate) reason: Option<String>,
+    /// a memory of the noise explains what was found as well in the rows that were fitted: another pass has to tell it
+    pub(crate) in_doubt: bool,
     pub(crate) angular_gain: Estimate,
     pub(crate) detection_gain_ratio: Option<Estimate>,
     pub(crate) effects: Vec<EffectReport>,
@@ -109,76 +111,14 @@ impl Head {
     }
 }
 
-/// Errors of a rate gyroscope that differ by less than this share are one: rows held out at one rate have a best line that takes
-/// a bias and a scale factor along, whatever they are, and are no test of either.
-const SAME_ERROR: f64 = 1e-3;
 /// A gain or a bias of a run's own that moves its angle by so many times what is left of it is not that of all runs.
 const ODD: f64 = 3.0;
+/// What is said where another pass tells what is undone.
+const TOLD_BY_ANOTHER_PASS: &str = "in the rows that were fitted a memory of the noise would explain what was found as well: a held-out \
+                                    run, another pass, tells that it is the sensor's";
 /// Points of one curve.
 const CURVE_POINTS: usize = 2000;
-/// Reference steps below which differences of neighbours are noise, rad; and how near stations count as one, rad.
-const DENSE_STEP: f64 = 0.035;
-const SAME_STATION: f64 = 1e-3;
-/// Pairs of repeated stations that a noise floor needs.
-const FEWEST_PAIRS: usize = 10;
-
-/// The errors of every stage on the held-out rows, and of what is undone on the fitted ones.
-struct Evaluated {
-    raw: Option<Evaluation>,
-    declared: Evaluation,
-    discovered: Evaluation,
-    on_fit: Evaluation,
-    /// why nothing is undone, where nothing is: every stage is the raw one then
-    reason: Option<String>,
-}
-
-impl Evaluated {
-    fn of(finding: &Finding<'_>, fitted: &[SensorRun], held: &[SensorRun]) -> Self {
-        let evaluate = |errors: &Errors<'_>, runs: &[SensorRun], like: Option<&Evaluation>| {
-            let segments = runs.iter().map(|r| segment(r, errors(r), finding)).collect();
-            Evaluation::of_segments(segments, like)
-        };
-        let mut discovered = evaluate(&finding.discovered, held, None);
-        let raw = finding.raw.as_ref().map(|raw| evaluate(raw, held, Some(&discovered)));
-        let mut declared = evaluate(&finding.declared, held, Some(&discovered));
-        let told = gate::gain_is_told(&finding.angular_gain) || !finding.effects.is_empty();
-        let untold = (finding.instrument == Instrument::Gyroscope && !told)
-            .then(|| "neither a bias, a scale factor nor a lag is told: nothing is undone".to_owned());
-        let reason = finding.reason.clone().or(untold).or_else(|| {
-            let [left, nothing] = [discovered.size(), raw.as_ref()?.size()].map(|size| size.rms_deg);
-            let alike = if finding.instrument == Instrument::Gyroscope { SAME_ERROR } else { 0.0 };
-            (left > (1.0 + alike) * nothing).then(|| {
-                format!(
-                    "what was found does not help on held-out data: it leaves {left:.4}°, and nothing undone leaves \
-                     {nothing:.4}°"
-                )
-            })
-        });
-        let neutral = reason.is_some();
-        if neutral && let Some(raw) = &raw {
-            (discovered, declared) = (raw.clone(), raw.clone());
-        }
-        let undone = finding.raw.as_ref().filter(|_| neutral).unwrap_or(&finding.discovered);
-        Self { on_fit: evaluate(undone, fitted, None), raw, declared, discovered, reason }
-    }
-
-    fn heldout(&self, held: &[SensorRun]) -> Heldout {
-        Heldout {
-            raw: self.raw.as_ref().map(Evaluation::size),
-            declared: self.declared.size(),
-            discovered: self.discovered.size(),
-            noise_floor_deg: noise_floor(&self.discovered, held).to_degrees(),
-        }
-    }
-
-    /// Samples that are set aside as spikes, in any of these runs.
-    fn spikes(&self, runs: impl Iterator<Item = usize>) -> usize {
-        let numbers: BTreeSet<usize> = runs.collect();
-        numbers.iter().map(|&n| self.on_fit.spikes_of(n) + self.discovered.spikes_of(n)).sum()
-    }
-}
-
-/// Reads the held-out rows, which nothing but a model in doubt has met before, and reports.
+/// Reads the held-out rows, which nothing has met before, and reports.
 ///
 /// # Errors
 /// Where what was found does not pass the gate.
@@ -200,6 +140,7 @@ pub(crate) fn report(
     }
     let mut warnings = head.warnings.clone();
     warnings.extend(finding.warnings.iter().cloned());
+    warnings.extend((finding.in_doubt && !neutral).then(|| TOLD_BY_ANOTHER_PASS.to_owned()));
     let spikes = errors.spikes(fitted.iter().chain(held).map(|r| r.number));
     warnings.extend(set_aside(spikes, "sample"));
     let heldout = errors.heldout(held);
@@ -215,7 +156,7 @@ pub(crate) fn report(
     let angular_gain = covering_all(&finding, &odd, &mut reported, &mut warnings);
     let residual = residual_report(&errors.on_fit, discovered);
     let mut unexplained = described(&effects, &finding, fitted);
-    if finding.readout.is_some() && fitted.iter().all(|run| run.commanded) {
+    if finding.readout.is_some() && is_commanded(fitted) {
         unexplained.extend(against_a_command(&residual));
     }
     let report = Report {
@@ -267,48 +208,6 @@ fn turns(run: &SensorRun) -> bool {
     run.travel_rad() > std::f64::consts::TAU
 }
 
-/// A run's errors as the residual diagnostics take them.
-fn segment(run: &SensorRun, errors: Vec<f64>, finding: &Finding<'_>) -> Residual {
-    let gain = finding.hypothesis.sense() * finding.hypothesis.angular_gain;
-    Residual {
-        track: run.number,
-        samples: run.len(),
-        t_s: run.t_s.clone(),
-        turned: run.reference_rad.iter().map(|a| a - run.reference_rad[0]).collect(),
-        table: run.reference_rad.clone(),
-        direction: (finding.direction)(run),
-        precession: run.rate_rad_s.iter().map(|w| gain * w).collect(),
-        angle: errors,
-        amplitude: vec![0.0; run.len()],
-    }
-}
-
-/// The white part of the error where the rows stand densely; else the repeatability of stations that were met more than
-/// once; else all that is left. It is never more than that.
-fn noise_floor(after: &Evaluation, held: &[SensorRun]) -> f64 {
-    let all = after.mean_square().sqrt();
-    let mut steps: Vec<f64> =
-        held.iter().flat_map(|r| r.reference_rad.windows(2).map(|w| (w[1] - w[0]).abs())).collect();
-    if median(&mut steps) < DENSE_STEP {
-        return after.noise_floor().min(all);
-    }
-    let mut stations: Vec<(f64, f64)> = after
-        .segments
-        .iter()
-        .flat_map(|s| s.table.iter().zip(&s.angle).map(|(a, e)| (a.rem_euclid(std::f64::consts::TAU), *e)))
-        .collect();
-    stations.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let pairs: Vec<f64> = stations
-        .windows(2)
-        .filter(|w| w[1].0 - w[0].0 < SAME_STATION)
-        .map(|w| 0.5 * (w[1].1 - w[0].1).powi(2))
-        .collect();
-    if pairs.len() < FEWEST_PAIRS {
-        return all;
-    }
-    (pairs.iter().sum::<f64>() / pairs.len() as f64).sqrt().min(all)
-}
-
 fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
     StepReport {
         stage: if e.origin == Origin::Discovered { "discovered".into() } else { "empirical".into() },
@@ -325,7 +224,10 @@ fn step(e: &EffectReport, after: &Evaluation) -> StepReport {
 
 /// What is said of a harmonic of the angle table of a sensor with so many periods a turn; once a turn of the shaft its eccentricity
 /// shows, in the angle and not in the radius.
-fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64) -> &'static str {
+fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64, commanded: bool) -> &'static str {
+    if commanded {
+        return AGAINST_A_COMMAND;
+    }
     let once_a_turn = n == Some(1) && (periods - 1.0).abs() < 1e-9;
     match (finding.readout.is_some(), once_a_turn) {
         (true, true) => {
@@ -344,6 +246,16 @@ fn of_a_table(finding: &Finding<'_>, n: Option<u32>, periods: f64) -> &'static s
     }
 }
 
+/// What is said of a harmonic against a reference that was commanded.
+const AGAINST_A_COMMAND: &str = "corrected on these data: the sensor's or the drive's, which a commanded reference does not tell apart; it is \
+                                 not carried into the calibration; record table_deg, or state reference = \"measured\" in campaign.toml \
+                                 where the rate was kept";
+
+/// Of no fitted run more is known than what its reference was asked to do.
+fn is_commanded(fitted: &[SensorRun]) -> bool {
+    fitted.iter().all(|run| run.commanded)
+}
+
 /// What is said of an error that a recording without a reference does not tell.
 const BY_ACCELERATION: &str = "corrected as an error in proportion to the acceleration on these data, as a tracking loop makes; it is not \
                                carried into the calibration, and a compensated recording keeps it";
@@ -351,6 +263,7 @@ const BY_ACCELERATION: &str = "corrected as an error in proportion to the accele
 /// What was corrected without a known cause on these runs.
 fn described(effects: &[EffectReport], finding: &Finding<'_>, fitted: &[SensorRun]) -> Vec<Unexplained> {
     let periods = finding.hypothesis.angular_gain.abs();
+    let commanded = finding.readout.is_some() && is_commanded(fitted);
     let mut out = Vec::new();
     let value = |e: &EffectReport, name: &str| e.parameters.iter().find(|p| p.name == name).map_or(0.0, |p| p.value);
     let mut add = |class: &str, n: Option<u32>, amplitude: f64, suggestion: &str| {
@@ -371,7 +284,7 @@ fn described(effects: &[EffectReport], finding: &Finding<'_>, fitted: &[SensorRu
                     let seen = |p: &crate::report::ParameterReport| p.ci95.is_some_and(|i| i[0] > 0.0 || i[1] < 0.0);
                     if seen(c) || seen(s) {
                         let n = c.name.trim_start_matches("cos_").parse().ok();
-                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table(finding, n, periods));
+                        add("pattern-harmonic", n, c.value.hypot(s.value), of_a_table(finding, n, periods, commanded));
                     }
                 }
             }

@@ -59,16 +59,18 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
     for i in 1..rows.saturating_sub(1) {
         let share = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
         let off = |v: &[f64]| v[i] - v[i - 1] - share * (v[i + 1] - v[i - 1]);
-        let chord = (x[i + 1] - x[i - 1]).hypot(y[i + 1] - y[i - 1]);
-        let amplitude = f64::max(x[i - 1].hypot(y[i - 1]), x[i + 1].hypot(y[i + 1]));
+        // squares: a root for every row is most of the time
+        let square = |x: f64, y: f64| x * x + y * y;
+        let chord = square(x[i + 1] - x[i - 1], y[i + 1] - y[i - 1]);
+        let amplitude = f64::max(square(x[i - 1], y[i - 1]), square(x[i + 1], y[i + 1])).sqrt();
         // what was drawn stands evenly; across a gap nothing was
         let is_even = EVEN.contains(&share);
         // a channel that stands still is another fault
         let both_move = x[i] != x[i - 1] && y[i] != y[i - 1];
-        let sagitta = chord * chord / (8.0 * amplitude);
+        let sagitta = chord / (8.0 * amplitude);
         if is_even && both_move && sagitta > rounding {
             judged += 1;
-            drawn[i] = off(x).hypot(off(y)) < rounding.min(ON_THE_CHORD * sagitta);
+            drawn[i] = square(off(x), off(y)) < rounding.min(ON_THE_CHORD * sagitta).powi(2);
         }
     }
     let found = drawn.iter().filter(|on| **on).count();

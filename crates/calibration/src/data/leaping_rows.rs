@@ -8,6 +8,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::data::plausibility::{places, stretches};
 use crate::numerics::statistics::median;
 use crate::recording::{Channel, Recording};
@@ -35,22 +37,34 @@ const LONGEST: usize = 2;
 const OF_A_CLUSTER: usize = 3;
 /// A cluster of more rows than this is a channel that works in steps, and no few rows that leap.
 const LARGEST_CLUSTER: usize = 60;
+/// Rows beyond which every so many say what is usual.
+const ENOUGH_ROWS: usize = 100_000;
 
 /// Puts into rows in which a channel of the vibration, or a command, leaps, or in which nothing is read, what lies between those beside
 /// them; how many they are, and what to say of them. The row stays: its rate belongs to the angle of the reference.
 pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
-    let lost = lost(recording);
-    let mut leaping = vec![false; recording.len()];
-    for channel in [Channel::Xc, Channel::Yc, Channel::Xs, Channel::Ys, Channel::Vas, Channel::Vqc] {
-        let Some(mut values) = recording.channel(channel).map(<[f64]>::to_vec) else { continue };
-        let mut leaps = Column { t_s: &recording.t_s, values: &values, lost: &lost }.leaps();
-        if matches!(channel, Channel::Vas | Channel::Vqc) {
-            // a loop that begins to work leaps at the beginning
-            leaps.retain(|(i, _)| (BESIDE..values.len() - BESIDE).contains(i));
-            if leaps.len() as f64 > MOST_OF_A_COMMAND * values.len() as f64 {
-                continue;
+    let times = Times::of(&recording.t_s, lost(recording));
+    let channels = [Channel::Xc, Channel::Yc, Channel::Xs, Channel::Ys, Channel::Vas, Channel::Vqc];
+    let found: Vec<(Channel, Vec<(usize, f64)>)> = channels
+        .into_par_iter()
+        .filter_map(|channel| {
+            let values = recording.channel(channel)?;
+            let mut leaps = Column { times: &times, values }.leaps();
+            if matches!(channel, Channel::Vas | Channel::Vqc) {
+                // a loop that begins to work leaps at the beginning
+                leaps.retain(|(i, _)| (BESIDE..values.len() - BESIDE).contains(i));
+                leaps.truncate(if leaps.len() as f64 > MOST_OF_A_COMMAND * values.len() as f64 {
+                    0
+                } else {
+                    leaps.len()
+                });
             }
-        }
+            Some((channel, leaps)).filter(|(_, leaps)| !leaps.is_empty())
+        })
+        .collect();
+    let mut leaping = vec![false; recording.len()];
+    for (channel, leaps) in found {
+        let Some(mut values) = recording.channel(channel).map(<[f64]>::to_vec) else { continue };
         for (i, value) in leaps {
             values[i] = value;
             leaping[i] = true;
@@ -88,35 +102,53 @@ fn lost(recording: &Recording) -> Vec<bool> {
     lost
 }
 
+/// When the rows were recorded, and which of them say nothing.
+struct Times<'a> {
+    t_s: &'a [f64],
+    lost: Vec<bool>,
+    any_is_lost: bool,
+    /// a usual interval, s
+    usual_s: f64,
+}
+
+impl<'a> Times<'a> {
+    fn of(t_s: &'a [f64], lost: Vec<bool>) -> Self {
+        let mut intervals: Vec<f64> = t_s.windows(2).step_by(stride(t_s.len())).map(|t| t[1] - t[0]).collect();
+        Self { t_s, any_is_lost: lost.contains(&true), lost, usual_s: median(&mut intervals) }
+    }
+}
+
+/// Of so many rows, every how many say what is usual.
+fn stride(rows: usize) -> usize {
+    (rows / ENOUGH_ROWS).max(1)
+}
+
 /// A channel over time.
 struct Column<'a> {
-    t_s: &'a [f64],
+    times: &'a Times<'a>,
     values: &'a [f64],
-    lost: &'a [bool],
 }
 
 impl Column<'_> {
     /// The rows that leap, and what lies between those beside them.
     fn leaps(&self) -> Vec<(usize, f64)> {
-        let n = self.values.len();
-        let mut intervals: Vec<f64> = self.t_s.windows(2).map(|t| t[1] - t[0]).collect();
+        let (n, lost) = (self.values.len(), &self.times.lost);
         // a digit more or less is no leap
         let steps = self.values.windows(2).map(|v| (v[1] - v[0]).abs());
         let digit = steps.filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         if n <= 4 * BESIDE || digit.is_infinite() {
             return Vec::new();
         }
-        let usual_s = median(&mut intervals);
-        let off = |i: usize, out: &[usize]| self.off(i, out, SPAN * usual_s);
-        let own: Vec<f64> = (0..n).map(|i| if self.lost[i] { 0.0 } else { off(i, &[]) }).collect();
-        let mut sorted = own.clone();
+        let off = |i: usize, out: &[usize]| self.off(i, out, SPAN * self.times.usual_s);
+        let own = |i: usize| if lost[i] { 0.0 } else { off(i, &[]) };
+        let mut some: Vec<f64> = (0..n).step_by(stride(n)).map(own).collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the rows")]
-        let at = (USUAL * (n - 1) as f64) as usize;
-        let limit = LEAP * (TAIL * *sorted.select_nth_unstable_by(at, f64::total_cmp).1).max(digit);
-        let is_lost = (0..n).filter(|i| self.lost[*i]);
+        let at = (USUAL * (some.len() - 1) as f64) as usize;
+        let limit = LEAP * (TAIL * *some.select_nth_unstable_by(at, f64::total_cmp).1).max(digit);
+        let is_lost = (0..n).filter(|i| lost[*i]);
         let mut found: Vec<(usize, f64)> = is_lost.map(|i| (i, self.between(i, &[]))).collect();
-        for cluster in clusters(&own, limit) {
-            let Some(leaping) = leaping(&cluster.filter(|i| !self.lost[*i]).collect::<Vec<_>>(), limit, off) else {
+        for cluster in clusters((0..n).filter(|i| own(*i) > limit), n) {
+            let Some(leaping) = leaping(&cluster.filter(|i| !lost[*i]).collect::<Vec<_>>(), limit, off) else {
                 continue;
             };
             let goes_back = |i: &usize| self.goes_back(*i, &leaping);
@@ -130,25 +162,25 @@ impl Column<'_> {
     /// By how much a value is off what those beside it say without rows that are `out`; nothing where they are far apart.
     fn off(&self, i: usize, out: &[usize], widest_s: f64) -> f64 {
         let beside = self.beside(i, out);
-        let times = || beside.iter().chain([&i]).map(|j| self.t_s[*j]);
-        let span = times().fold(f64::MIN, f64::max) - times().fold(f64::MAX, f64::min);
-        if span > widest_s {
+        let (first, last) = (beside[0].min(i), beside[2 * BESIDE - 1].max(i));
+        if self.times.t_s[last] - self.times.t_s[first] > widest_s {
             return 0.0;
         }
         let is_an_end = i < BESIDE || i + BESIDE >= self.values.len();
         let factor = if is_an_end { AT_AN_END } else { 1.0 };
-        (self.values[i] - self.through(&beside, self.t_s[i])).abs() / factor
+        (self.values[i] - self.through(&beside, self.times.t_s[i])).abs() / factor
     }
 
     /// The nearest rows before and after one that are not `out`, in their order; at an end more of the other side.
     fn beside(&self, i: usize, out: &[usize]) -> [usize; 2 * BESIDE] {
         let n = self.values.len();
         // most rows, and the least work
-        let all_are_sound = |lost: &[bool]| out.is_empty() && !lost.contains(&true);
-        if i >= BESIDE && self.lost.get(i - BESIDE..=i + BESIDE).is_some_and(all_are_sound) {
+        let lost = &self.times.lost;
+        let all_are_sound = |lost: &[bool]| out.is_empty() && (!self.times.any_is_lost || !lost.contains(&true));
+        if i >= BESIDE && lost.get(i - BESIDE..=i + BESIDE).is_some_and(all_are_sound) {
             return std::array::from_fn(|k| if k < BESIDE { i + k - BESIDE } else { i + 1 + k - BESIDE });
         }
-        let is_sound = |j: &usize| !self.lost[*j] && !out.contains(j);
+        let is_sound = |j: &usize| !lost[*j] && !out.contains(j);
         let mut before = (0..i).rev().filter(is_sound);
         let mut after = (i + 1..n).filter(is_sound);
         let mut beside = [i; 2 * BESIDE];
@@ -161,17 +193,20 @@ impl Column<'_> {
         beside
     }
 
-    /// The polynomial through some rows, at a time.
+    /// The polynomial through some rows, at a time (Lagrange).
     fn through(&self, rows: &[usize], t: f64) -> f64 {
-        let weight = |j: &usize| -> f64 {
-            let others = rows.iter().filter(|k| *k != j);
-            others.map(|k| (t - self.t_s[*k]) / (self.t_s[*j] - self.t_s[*k])).product()
+        let from = |j: usize| self.times.t_s[j] - t;
+        let weight = |j: usize| {
+            let others = rows.iter().filter(|k| **k != j);
+            let (above, below) =
+                others.fold((1.0, 1.0), |(above, below), &k| (above * from(k), below * (from(k) - from(j))));
+            above / below
         };
-        rows.iter().map(|j| weight(j) * self.values[*j]).sum()
+        rows.iter().map(|&j| weight(j) * self.values[j]).sum()
     }
 
     fn between(&self, i: usize, out: &[usize]) -> f64 {
-        self.through(&self.beside(i, out), self.t_s[i])
+        self.through(&self.beside(i, out), self.times.t_s[i])
     }
 
     /// Whether the rows before and those after one lead to the same, beside which it leaps.
@@ -180,16 +215,16 @@ impl Column<'_> {
         if before.len() != after.len() {
             return true;
         }
-        let [from, to] = [before, after].map(|rows| self.through(&rows, self.t_s[i]));
+        let [from, to] = [before, after].map(|rows| self.through(&rows, self.times.t_s[i]));
         (to - from).abs() < BACK * (self.values[i] - 0.5 * (from + to)).abs()
     }
 }
 
-/// Rows that are off by more than `limit`, with those that could have pulled them.
-fn clusters(off: &[f64], limit: f64) -> Vec<Range<usize>> {
+/// Rows that are off, in their order, with those of `all` that could have pulled them.
+fn clusters(off: impl Iterator<Item = usize>, all: usize) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
-    for i in (0..off.len()).filter(|i| off[*i] > limit) {
-        let (start, end) = (i.saturating_sub(BESIDE), (i + BESIDE + 1).min(off.len()));
+    for i in off {
+        let (start, end) = (i.saturating_sub(BESIDE), (i + BESIDE + 1).min(all));
         match out.last_mut() {
             Some(last) if last.end >= start => last.end = end,
             _ => out.push(start..end),
@@ -237,7 +272,8 @@ mod tests {
 
     fn leaps(values: &[f64]) -> Vec<usize> {
         let t_s: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
-        Column { t_s: &t_s, values, lost: &vec![false; values.len()] }.leaps().into_iter().map(|(i, _)| i).collect()
+        let times = Times::of(&t_s, vec![false; values.len()]);
+        Column { times: &times, values }.leaps().into_iter().map(|(i, _)| i).collect()
     }
 
     #[test]

@@ -112,6 +112,7 @@ struct Entry {
     twin: String,
     cover: String,
     details: String,
+    recorded: bool,
 }
 
 /// The bit-precise proofs that ran, and why others did not.
@@ -123,7 +124,7 @@ pub(crate) fn proofs(repository: &Path, keep: bool) -> Result<(Vec<Proof>, Vec<S
             notes.push("the results of `cargo xtask prove` are missing or older than the sources".to_owned());
             return Ok((Vec::new(), notes));
         }
-    } else if let Err(reason) = prove::run(None) {
+    } else if let Err(reason) = prove::run(prove::Request::default()) {
         notes.push(format!("the bit-precise proofs did not run: {reason}"));
         return Ok((Vec::new(), notes));
     }
@@ -136,7 +137,7 @@ fn entries(text: &str) -> Result<Vec<Proof>, String> {
     let engine = results["engine"].as_str().unwrap_or_default().to_owned();
     let entries: Vec<Entry> = serde_json::from_value(results["proofs"].clone()).map_err(|e| e.to_string())?;
     let proof = |e: Entry| Proof {
-        engine: format!("{engine}, {}", e.solver),
+        engine: format!("{engine}, {}{}", e.solver, if e.recorded { ", recorded on the same sources" } else { "" }),
         status: match (e.status.as_str(), e.cover.as_str()) {
             ("passed", "reached") => Status::Passed,
             ("", _) => Status::NotRun,

@@ -6,6 +6,7 @@
 mod compile;
 mod engine;
 mod pins;
+mod recorded;
 mod root;
 mod rules;
 
@@ -88,6 +89,27 @@ impl<'a> Job<'a> {
     }
 }
 
+/// A proof with its twin, asked of one solver.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Claim<'a> {
+    proof: Job<'a>,
+    twin: Job<'a>,
+}
+
+/// What of the harnesses is proved.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Request<'a> {
+    /// those whose path contains this, without the guards and without leaving a result; all where nothing is said
+    pub(crate) only: Option<&'a str>,
+    /// what has changed since it was recorded, and the guards; of the rest as much as so many seconds of the processor have room for
+    pub(crate) most_s: Option<f64>,
+    /// the verdicts are put into the repository
+    pub(crate) record: bool,
+}
+
+/// Claims that are proved again however little time there is: of none nothing follows.
+const FEWEST_AGAIN: usize = 4;
+
 /// What a proof takes for granted.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Assumption {
@@ -97,7 +119,7 @@ pub(crate) struct Assumption {
 }
 
 /// What a run says of one proof. `README.md` of this crate tells the fields to readers of the file.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ProofResult {
     pub(crate) name: String,
     /// `cvg-controller`
@@ -127,6 +149,36 @@ pub(crate) struct ProofResult {
     pub(crate) twin_seconds: f64,
     /// what was found, in words
     pub(crate) details: String,
+    /// the name of the sources that it is about
+    pub(crate) program: String,
+    /// it was found by an earlier run, of the same sources
+    pub(crate) recorded: bool,
+}
+
+impl ProofResult {
+    /// With what the sources say of the claim.
+    fn said_of(self, claim: &Claim<'_>) -> Self {
+        let (proof, f) = (claim.proof.harness, &claim.proof.harness.function);
+        let scalar = ["f32", "f64"].into_iter().find(|scalar| f.name.ends_with(scalar)).unwrap_or_default();
+        Self {
+            name: f.name.clone(),
+            package: proof.package(),
+            place: format!("{}:{}", f.file.display(), f.line),
+            claim: f.doc.clone(),
+            functions: source::subjects(&f.doc),
+            requirements: f.citations.iter().map(|c| c.target.clone()).collect(),
+            scalar: scalar.to_owned(),
+            solver: claim.proof.solver.to_owned(),
+            assumptions: proof.assumptions.clone(),
+            covers: proof.covers.clone(),
+            ..self
+        }
+    }
+
+    /// Proved, with its twin refuted and its covers reached.
+    fn is_sound(&self) -> bool {
+        self.status == "passed" && self.twin == "rejected" && self.cover == "reached"
+    }
 }
 
 /// What a run leaves behind.
@@ -237,8 +289,8 @@ pub(crate) fn results_file(repository: &Path) -> PathBuf {
     repository.join("target/prove/results.json")
 }
 
-/// Proves all harnesses; or tries those whose path contains `only`, without the guards and without leaving a result.
-pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
+/// Proves what is asked for.
+pub(crate) fn run(request: Request<'_>) -> crate::Outcome {
     let started = Instant::now();
     let repository = crate::repository();
     let all = harnesses(&repository)?;
@@ -247,51 +299,86 @@ pub(crate) fn run(only: Option<&str>) -> crate::Outcome {
     let folders = compile::compile(&repository, &root, &all)?;
     println!("compiled {} harnesses in {:.0} s", all.len(), started.elapsed().as_secs_f64());
 
-    let asked: Vec<Job<'_>> =
-        all.iter().filter(|h| only.is_none_or(|text| h.address().contains(text))).flat_map(Job::of).collect();
-    let answers = ask_all(&root, &folders, &asked);
+    let programs: BTreeMap<&str, String> = folders
+        .keys()
+        .map(|package| Ok((package.as_str(), recorded::program(&repository, package)?)))
+        .collect::<Result<_, String>>()?;
+    let program = |h: &Harness| programs.get(h.package().as_str()).map_or("", String::as_str);
+    let recorded =
+        if request.most_s.is_some() { recorded::Recorded::read(&repository) } else { recorded::Recorded::default() };
+    let packages = root.packages();
+    let known = |claim: &Claim<'_>| recorded.of(claim, program(claim.proof.harness), &packages);
+    let claims = claims(&all, request.only)?;
+    let (mut again, open): (Vec<Claim<'_>>, Vec<Claim<'_>>) =
+        claims.iter().partition(|claim| !claim.proof.harness.is_guard() && known(claim).is_some());
+    let commit = source::git(&["rev-parse", "HEAD"]).unwrap_or_default();
+    again.sort_by_cached_key(|claim| source::drawn(commit.trim(), &claim.proof.harness.path));
+    let mut answers = ask_all(&root, &folders, &open, None)?;
+    answers.extend(ask_all(&root, &folders, &again, request.most_s)?);
     let mut proofs = Vec::new();
-    for job in asked.iter().filter(|job| job.harness.function.name.starts_with("proof_")) {
-        let name = job.harness.function.name.as_str();
-        let twin_name = format!("twin_{}", job.harness.claim());
-        let twin = asked.iter().find(|t| t.harness.function.name == twin_name && t.solver == job.solver);
-        let (Some(answer), Some(twin)) = (answers.get(&job.key()), twin.and_then(|twin| answers.get(&twin.key())))
-        else {
-            return Err(format!("{name} or its twin was not run"));
+    for claim in &claims {
+        let found = match (answer(&answers, &claim.proof), answer(&answers, &claim.twin), known(claim)) {
+            (Some(proof), Some(twin), _) => result(claim, proof, twin),
+            (_, _, Some(before)) => carried(claim, before),
+            _ => return Err(format!("{} or its twin was not run", claim.proof.harness.function.name)),
         };
-        proofs.push(result(job, answer, &twin_name, twin));
+        proofs.push(ProofResult { program: program(claim.proof.harness).to_owned(), ..found });
     }
     proofs.sort_by(|a, b| a.name.cmp(&b.name));
     let results = Results {
         engine: "CBMC on the compiled wasm".to_owned(),
-        packages: root.packages(),
+        packages,
         seconds: started.elapsed().as_secs_f64(),
         processor_seconds: processor_seconds()?,
         proofs,
     };
     print(&results);
-    let guards: f64 = asked
-        .iter()
-        .filter(|job| job.harness.is_guard())
-        .filter_map(|job| answers.get(&job.key()))
-        .map(|a| a.seconds)
-        .sum();
-    if only.is_none() {
+    if request.only.is_none() && request.most_s.is_none() {
+        let guards = claims.iter().filter(|claim| claim.proof.harness.is_guard());
+        let guards: f64 = guards
+            .flat_map(|claim| [&claim.proof, &claim.twin])
+            .filter_map(|job| answer(&answers, job))
+            .map(|a| a.seconds)
+            .sum();
         let times = results.processor_seconds / guards;
         println!("{times:.1} times what the guards took, {guards:.1} s; {MOST_GUARDS} times are allowed");
         if times > MOST_GUARDS {
             return Err(format!("{:.0} s on the processor are too many", results.processor_seconds));
         }
     }
-    let sound = results.proofs.iter().all(|p| p.status == "passed" && p.twin == "rejected" && p.cover == "reached");
+    let sound = !results.proofs.is_empty() && results.proofs.iter().all(ProofResult::is_sound);
     let file = results_file(&repository);
     // a part of the harnesses is no result for the audit
-    if only.is_none() {
+    if request.only.is_none() {
         let text = serde_json::to_string_pretty(&results).map_err(|e| e.to_string())?;
         fs::write(&file, text).map_err(|e| e.to_string())?;
         println!("{}", file.display());
     }
-    Ok(sound && !results.proofs.is_empty())
+    if request.record && sound {
+        println!("{}", recorded::write(&repository, &results)?.display());
+    }
+    Ok(sound)
+}
+
+/// What came of a harness, where it was asked about.
+fn answer<'a, 'b>(answers: &'a BTreeMap<(&'b str, &'b str), Answer>, job: &Job<'b>) -> Option<&'a Answer> {
+    answers.get(&job.key())
+}
+
+/// Every proof with its twin, once for each solver that is asked.
+fn claims<'a>(all: &'a [Harness], only: Option<&str>) -> Result<Vec<Claim<'a>>, String> {
+    let asked = all.iter().filter(|h| only.is_none_or(|text| h.address().contains(text)));
+    let proofs = asked.filter(|h| h.function.name.starts_with("proof_")).flat_map(Job::of);
+    let mut claims = Vec::new();
+    for proof in proofs {
+        let name = format!("twin_{}", proof.harness.claim());
+        let twin = all.iter().filter(|h| h.function.name == name).flat_map(Job::of).find(|t| t.solver == proof.solver);
+        claims.push(Claim {
+            proof,
+            twin: twin.ok_or_else(|| format!("{name} is asked of another solver than its proof"))?,
+        });
+    }
+    Ok(claims)
 }
 
 /// What the children of this process have taken on the processor, user and system.
@@ -306,46 +393,67 @@ fn processor_seconds() -> Result<f64, String> {
     }
 }
 
+/// Asks about claims, about at least some of them until so many seconds of the processor are used.
 fn ask_all<'a>(
     root: &root::Root,
     folders: &BTreeMap<String, PathBuf>,
-    asked: &[Job<'a>],
-) -> BTreeMap<(&'a str, &'a str), Answer> {
+    claims: &[Claim<'a>],
+    most_s: Option<f64>,
+) -> Result<BTreeMap<(&'a str, &'a str), Answer>, String> {
     let next = AtomicUsize::new(0);
     let answers = Mutex::new(BTreeMap::new());
     let workers = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let before = processor_seconds()?;
+    let is_over = |at: usize| {
+        let used = || processor_seconds().map_or(f64::INFINITY, |now| now - before);
+        at >= FEWEST_AGAIN && most_s.is_some_and(|most| used() >= most)
+    };
     std::thread::scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
-                while let Some(job) = asked.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let h = job.harness;
-                    let query = Query {
-                        name: &h.function.name,
-                        covers: h.covers.iter().map(String::as_str).collect(),
-                        unwind: h.function.argument("kani::unwind").unwrap_or(engine::UNWIND),
-                        solver: job.solver,
-                        limit: Duration::from_secs(LIMIT_S),
-                    };
-                    let Some(folder) = folders.get(&h.package()) else { continue };
-                    let answer = engine::ask(root, folder, &query);
-                    let verdict = answer.verdict(&query.covers);
-                    println!("{:>7.1} s  {} ({}): {verdict:?}", answer.seconds, h.function.name, job.solver);
-                    if let Ok(mut answers) = answers.lock() {
-                        answers.insert(job.key(), answer);
+                loop {
+                    let at = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(claim) = claims.get(at).filter(|_| !is_over(at)) else { break };
+                    for job in [claim.proof, claim.twin] {
+                        let Some(answer) = ask(root, folders, &job) else { continue };
+                        if let Ok(mut answers) = answers.lock() {
+                            answers.insert(job.key(), answer);
+                        }
                     }
                 }
             });
         }
     });
-    answers.into_inner().unwrap_or_default()
+    Ok(answers.into_inner().unwrap_or_default())
 }
 
-fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> ProofResult {
-    let proof = job.harness;
+/// Asks about one harness, and prints what came of it.
+fn ask(root: &root::Root, folders: &BTreeMap<String, PathBuf>, job: &Job<'_>) -> Option<Answer> {
+    let h = job.harness;
+    let query = Query {
+        name: &h.function.name,
+        covers: h.covers.iter().map(String::as_str).collect(),
+        unwind: h.function.argument("kani::unwind").unwrap_or(engine::UNWIND),
+        solver: job.solver,
+        limit: Duration::from_secs(LIMIT_S),
+    };
+    let answer = engine::ask(root, folders.get(&h.package())?, &query);
+    let verdict = answer.verdict(&query.covers);
+    println!("{:>7.1} s  {} ({}): {verdict:?}", answer.seconds, h.function.name, job.solver);
+    Some(answer)
+}
+
+/// What an earlier run found, of a claim as the sources have it.
+fn carried(claim: &Claim<'_>, before: &ProofResult) -> ProofResult {
+    ProofResult { recorded: true, ..before.clone() }.said_of(claim)
+}
+
+fn result(claim: &Claim<'_>, answer: &Answer, twin: &Answer) -> ProofResult {
+    let proof = claim.proof.harness;
     let covers: Vec<_> = proof.covers.iter().map(String::as_str).collect();
     let verdict = answer.verdict(&covers);
     let twin_verdict = twin.verdict(&covers);
-    let rejected = match twin_name {
+    let rejected = match claim.twin.key().0 {
         CUT_SHORT => Verdict::Unwound,
         RUN_OVER => Verdict::Beyond,
         _ => Verdict::Refuted,
@@ -357,21 +465,9 @@ fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> Pro
     if twin_verdict != rejected {
         details.push(format!("twin: {twin_verdict:?}"));
     }
-    let f = &proof.function;
-    let scalar = ["f32", "f64"].into_iter().find(|scalar| f.name.ends_with(scalar)).unwrap_or_default();
-    ProofResult {
-        name: f.name.clone(),
-        package: proof.package(),
-        place: format!("{}:{}", f.file.display(), f.line),
-        claim: f.doc.clone(),
-        functions: source::subjects(&f.doc),
-        requirements: f.citations.iter().map(|c| c.target.clone()).collect(),
-        scalar: scalar.to_owned(),
-        solver: job.solver.to_owned(),
-        assumptions: proof.assumptions.clone(),
+    let found = ProofResult {
         status: if verdict == Verdict::Proved { "passed" } else { "failed" }.to_owned(),
         twin: if twin_verdict == rejected { "rejected" } else { "accepted" }.to_owned(),
-        covers: proof.covers.clone(),
         cover: match &verdict {
             Verdict::Proved => "reached",
             Verdict::Vacuous(_) => "missed",
@@ -381,7 +477,9 @@ fn result(job: &Job<'_>, answer: &Answer, twin_name: &str, twin: &Answer) -> Pro
         seconds: answer.seconds,
         twin_seconds: twin.seconds,
         details: details.join("; "),
-    }
+        ..ProofResult::default()
+    };
+    found.said_of(claim)
 }
 
 fn print(results: &Results) {
@@ -394,12 +492,14 @@ fn print(results: &Results) {
             p.twin,
             p.cover,
             p.seconds + p.twin_seconds,
-            if p.details.is_empty() { String::new() } else { format!("  {}", p.details) }
+            if p.recorded { "  recorded".to_owned() } else { format!("  {}", p.details) }
         );
     }
     let passed = results.proofs.iter().filter(|p| p.status == "passed" && p.twin == "rejected").count();
+    let recorded = results.proofs.iter().filter(|p| p.recorded).count();
     println!(
-        "{passed} of {} proved with their twins rejected; {:.0} s on the processor, {:.0} s by the clock",
+        "{passed} of {} proved with their twins rejected, {recorded} of them by an earlier run on the same sources; {:.0} s on the processor, \
+         {:.0} s by the clock",
         results.proofs.len(),
         results.processor_seconds,
         results.seconds
