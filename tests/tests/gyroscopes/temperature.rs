@@ -136,7 +136,8 @@ fn whatever_follows_the_temperature_is_named_with_its_slope() {
     });
     let few = (outcomes.len() / 10).max(1);
     assert!(outcomes.iter().all(|o| o.0), "something else was claimed or blamed, or more than noise is left");
-    assert!(outcomes.iter().all(|o| o.1 < 2.0), "a slope is far from its interval: {outcomes:?}");
+    // of 36 (CVG_TRIALS) 31 are within their interval, and none is further off than 1.31 half widths: somewhat narrow
+    assert!(outcomes.iter().all(|o| o.1 < 1.5), "a slope is far from its interval: {outcomes:?}");
     assert!(outcomes.iter().filter(|o| !o.2).count() <= few, "intervals of the gain miss: {outcomes:?}");
 }
 

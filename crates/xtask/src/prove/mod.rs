@@ -306,8 +306,7 @@ pub(crate) fn run(request: Request<'_>) -> crate::Outcome {
     let program = |h: &Harness| programs.get(h.package().as_str()).map_or("", String::as_str);
     let recorded =
         if request.most_s.is_some() { recorded::Recorded::read(&repository) } else { recorded::Recorded::default() };
-    let packages = root.packages();
-    let known = |claim: &Claim<'_>| recorded.of(claim, program(claim.proof.harness), &packages);
+    let known = |claim: &Claim<'_>| recorded.of(claim, program(claim.proof.harness));
     let claims = claims(&all, request.only)?;
     let (mut again, open): (Vec<Claim<'_>>, Vec<Claim<'_>>) =
         claims.iter().partition(|claim| !claim.proof.harness.is_guard() && known(claim).is_some());
@@ -327,7 +326,7 @@ pub(crate) fn run(request: Request<'_>) -> crate::Outcome {
     proofs.sort_by(|a, b| a.name.cmp(&b.name));
     let results = Results {
         engine: "CBMC on the compiled wasm".to_owned(),
-        packages,
+        packages: root.packages(),
         seconds: started.elapsed().as_secs_f64(),
         processor_seconds: processor_seconds()?,
         proofs,

@@ -12,10 +12,9 @@ use std::process::{Command, Stdio};
 use super::{Claim, ProofResult, Results, compile};
 use crate::source;
 
-/// What was proved, with the tools that proved it.
+/// What was proved.
 #[derive(Debug, Default)]
 pub(crate) struct Recorded {
-    packages: Vec<String>,
     proofs: Vec<ProofResult>,
 }
 
@@ -24,14 +23,14 @@ impl Recorded {
     pub(crate) fn read(repository: &Path) -> Self {
         let text = fs::read_to_string(file(repository)).unwrap_or_default();
         let results: Option<Results> = serde_json::from_str(&text).ok();
-        results.map(|r| Self { packages: r.packages, proofs: r.proofs }).unwrap_or_default()
+        results.map(|r| Self { proofs: r.proofs }).unwrap_or_default()
     }
 
-    /// What was found of a claim by these tools, where it held, of the same program.
-    pub(crate) fn of(&self, claim: &Claim<'_>, program: &str, packages: &[String]) -> Option<&ProofResult> {
+    /// What was found of a claim, where it held, of the same program.
+    pub(crate) fn of(&self, claim: &Claim<'_>, program: &str) -> Option<&ProofResult> {
         let (name, solver) = claim.proof.key();
         let is_it = |p: &&ProofResult| p.name == name && p.solver == solver && p.program == program;
-        self.proofs.iter().find(is_it).filter(|p| p.is_sound() && self.packages == packages)
+        self.proofs.iter().find(is_it).filter(|p| p.is_sound())
     }
 }
 
@@ -47,8 +46,8 @@ fn file(repository: &Path) -> PathBuf {
     repository.join("crates/xtask/proved.json")
 }
 
-/// The name, by git, of all that a verdict about a package's harnesses comes from: its sources and those of what it depends on, and how
-/// they are compiled and asked about.
+/// The name, by git, of all that a verdict about a package's harnesses comes from: its sources and those of what it depends on, how
+/// they are compiled and asked about, and by which tools: `pins.rs` has their versions, and with others nothing is proved.
 pub(crate) fn program(repository: &Path, package: &str) -> Result<String, String> {
     let mut folders: BTreeSet<String> = ["kani-shim".to_owned(), "xtask/src/prove".to_owned()].into();
     if let Some(name) = package.strip_prefix("cvg-") {
@@ -136,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_verdict_is_of_the_same_program_and_tools_and_was_sound() {
+    fn a_verdict_is_of_the_same_program_and_was_sound() {
         let all = harnesses(&crate::repository()).expect("harnesses");
         let twin = all.iter().find(|h| h.function.name.starts_with("twin_") && !h.is_guard()).expect("a twin");
         let proof = all.iter().find(|h| h.function.name == twin.function.name.replacen("twin_", "proof_", 1));
@@ -153,15 +152,10 @@ mod tests {
             cover: "reached".to_owned(),
             ..ProofResult::default()
         };
-        let tools = ["cbmc 6".to_owned()];
-        let known = |proof: ProofResult, program: &str, packages: &[String]| {
-            let recorded = Recorded { packages: tools.to_vec(), proofs: vec![proof] };
-            recorded.of(&claim, program, packages).is_some()
-        };
-        assert!(known(sound.clone(), "p", &tools));
-        assert!(!known(sound.clone(), "q", &tools) && !known(sound.clone(), "p", &[]));
-        assert!(!known(ProofResult { twin: "accepted".to_owned(), ..sound.clone() }, "p", &tools));
-        assert!(!known(ProofResult { cover: "missed".to_owned(), ..sound.clone() }, "p", &tools));
-        assert!(!known(ProofResult { solver: "t".to_owned(), ..sound }, "p", &tools));
+        let known = |proof: ProofResult, program: &str| Recorded { proofs: vec![proof] }.of(&claim, program).is_some();
+        assert!(known(sound.clone(), "p") && !known(sound.clone(), "q"));
+        assert!(!known(ProofResult { twin: "accepted".to_owned(), ..sound.clone() }, "p"));
+        assert!(!known(ProofResult { cover: "missed".to_owned(), ..sound.clone() }, "p"));
+        assert!(!known(ProofResult { solver: "t".to_owned(), ..sound }, "p"));
     }
 }
