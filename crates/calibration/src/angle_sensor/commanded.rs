@@ -24,7 +24,7 @@ pub(super) fn identify(sensor: Sensor, runs: &[SensorRun], asked: &[f64]) -> Res
     let sensor = Sensor { free_gain: false, ..sensor };
     let (readout, of_radius) = by_radius(sensor, runs)?;
     let repeats = repeats_against_the_command(sensor, runs, &readout, asked);
-    let shape = repeats.as_ref().map_or_else(|| Shape::constant(false), |model| model.table.shape.clone());
+    let shape = repeats.unwrap_or_else(|| Shape::constant(false));
     let samples = sensor.samples(runs, Some(&readout));
     let table = TableFit::new(&shape, &samples, runs.len(), sensor.cycles)
         .ok_or_else(|| refuse("the angle cannot be followed".into()))?;
@@ -33,8 +33,8 @@ pub(super) fn identify(sensor: Sensor, runs: &[SensorRun], asked: &[f64]) -> Res
         outcome: Outcome::Answered,
         readout: Some((readout, Weighting::Radius)),
         table,
-        predicted: repeats.as_ref().map_or(of_radius, |model| model.predicted),
-        predicted_raw: repeats.and_then(|model| model.predicted_raw),
+        predicted: of_radius,
+        predicted_raw: None,
         by_radius: true,
         tells_motion: false,
     })
@@ -73,14 +73,9 @@ fn by_radius(sensor: Sensor, runs: &[SensorRun]) -> Result<(Readout, f64), Refus
     Ok((readout, chosen.losses.rms()))
 }
 
-/// What the angle that this readout makes repeats against the command, as of a sensor that reads its angle; none where nothing does, or
-/// what does may be a memory of the noise.
-fn repeats_against_the_command(
-    sensor: Sensor,
-    runs: &[SensorRun],
-    readout: &Readout,
-    asked: &[f64],
-) -> Option<SensorModel> {
+/// The shape of what the angle that this readout makes repeats against the command, as of a sensor that reads its angle; none where
+/// nothing does, or what does may be a memory of the noise.
+fn repeats_against_the_command(sensor: Sensor, runs: &[SensorRun], readout: &Readout, asked: &[f64]) -> Option<Shape> {
     let angles = |run: &SensorRun| {
         let channels = run.channels()?;
         Some(SensorRun { reading: Reading::Angle(channels.iter().map(|z| readout.angle(*z)).collect()), ..run.clone() })
@@ -89,5 +84,5 @@ fn repeats_against_the_command(
     let model = SensorModel::chosen(sensor, &read, Competing::with(&[]), asked).ok()?;
     // how the angle follows a command's motion is the drive's
     let told = model.outcome == Outcome::Answered && model.table.shape.motion == Motion::None;
-    Some(model).filter(|model| told && model.table.shape.size() > 0)
+    Some(model.table.shape).filter(|shape| told && shape.size() > 0)
 }

@@ -133,9 +133,9 @@ impl Described<'_> {
     }
 
     fn evidence(&self) -> String {
-        let of_radius = self.model.by_radius && self.model.table.shape.size() == 0;
-        let of = if of_radius { "of the radius" } else { "of the angle" };
-        let degrees = |v: f64| if of_radius { format!("{v:.4}") } else { format!("{:.4}°", v.to_degrees()) };
+        let of = if self.model.by_radius { "of the radius" } else { "of the angle" };
+        let degrees =
+            |v: f64| if self.model.by_radius { format!("{v:.4}") } else { format!("{:.4}°", v.to_degrees()) };
         let before = self.model.predicted_raw.map_or(String::new(), |raw| format!(", {} as recorded", degrees(raw)));
         format!(
             "blocked cross-validation within the fitted rows leaves {} {of} with all that was found{before}; interval by \
@@ -193,11 +193,15 @@ impl Described<'_> {
             crate::model::angle_table::Form::Own => "written in the sensor's own angle",
             crate::model::angle_table::Form::Forward => "written in the true angle and inverted",
         };
-        let evidence = format!(
-            "repeats with position and no effect of the library explains it: a Fourier series of {} harmonics, {form}; {}",
-            table.cos.len(),
-            self.evidence()
-        );
+        let (repeats, tested) = if self.model.by_radius {
+            (
+                "repeats against the command, of the sensor or of the drive",
+                format!("interval by jackknife over {BLOCKS} blocks"),
+            )
+        } else {
+            ("repeats with position and no effect of the library explains it", self.evidence())
+        };
+        let evidence = format!("{repeats}: a Fourier series of {} harmonics, {form}; {tested}", table.cos.len());
         (!parameters.is_empty()).then(|| effect(ANGLE_TABLE.id, Origin::Empirical, parameters, evidence))
     }
 

@@ -43,7 +43,7 @@ pub(crate) struct SensorModel {
     pub(crate) readout: Option<(Readout, Weighting)>,
     pub(crate) table: TableFit,
     /// cross-validated rms of what was selected and of the sensor as it is, rad; of the radius where the reference is
-    /// commanded and nothing repeats against it
+    /// commanded
     pub(crate) predicted: f64,
     pub(crate) predicted_raw: Option<f64>,
     /// the reference was commanded and not believed: the readout is known from the radius alone, and a table is the sensor's or the drive's
@@ -186,7 +186,7 @@ impl SensorModel {
     }
 
     /// The sensor as it is.
-    pub(super) fn neutral(self, runs: &[SensorRun]) -> Self {
+    fn neutral(self, runs: &[SensorRun]) -> Self {
         let shape = Shape::constant(self.sensor.free_gain);
         let samples = self.sensor.samples(runs, None);
         let table = TableFit::new(&shape, &samples, runs.len(), self.sensor.cycles).unwrap_or(self.table);

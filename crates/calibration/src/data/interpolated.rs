@@ -61,13 +61,13 @@ pub(crate) fn interpolated_rows(t: &[f64], x: &[f64], y: &[f64]) -> Vec<bool> {
         let off = |v: &[f64]| v[i] - v[i - 1] - share * (v[i + 1] - v[i - 1]);
         // squares: a root for every row is most of the time
         let square = |x: f64, y: f64| x * x + y * y;
-        let chord = square(x[i + 1] - x[i - 1], y[i + 1] - y[i - 1]);
+        let chord_square = square(x[i + 1] - x[i - 1], y[i + 1] - y[i - 1]);
         let amplitude = f64::max(square(x[i - 1], y[i - 1]), square(x[i + 1], y[i + 1])).sqrt();
         // what was drawn stands evenly; across a gap nothing was
         let is_even = EVEN.contains(&share);
         // a channel that stands still is another fault
         let both_move = x[i] != x[i - 1] && y[i] != y[i - 1];
-        let sagitta = chord / (8.0 * amplitude);
+        let sagitta = chord_square / (8.0 * amplitude);
         if is_even && both_move && sagitta > rounding {
             judged += 1;
             drawn[i] = square(off(x), off(y)) < rounding.min(ON_THE_CHORD * sagitta).powi(2);

@@ -53,11 +53,9 @@ pub(crate) fn mend(recording: &mut Recording) -> Option<(usize, String)> {
             if matches!(channel, Channel::Vas | Channel::Vqc) {
                 // a loop that begins to work leaps at the beginning
                 leaps.retain(|(i, _)| (BESIDE..values.len() - BESIDE).contains(i));
-                leaps.truncate(if leaps.len() as f64 > MOST_OF_A_COMMAND * values.len() as f64 {
-                    0
-                } else {
-                    leaps.len()
-                });
+                if leaps.len() as f64 > MOST_OF_A_COMMAND * values.len() as f64 {
+                    leaps.clear();
+                }
             }
             Some((channel, leaps)).filter(|(_, leaps)| !leaps.is_empty())
         })
